@@ -313,11 +313,8 @@ std::shared_ptr<const SplatModel> FitSession::model() const {
 /// All key frames as they are now.
 std::shared_ptr<const SplatModel> FitSession::relay() const {
   std::lock_guard<std::mutex> lock(decode_mutex_);
-  const KeyFrameSource source = relayResult(ended().model());
-  const KeyFrameClip clip = keyFrameClip(options_, *views_);
-  std::vector<std::shared_ptr<const KeyFrame>> frames;
-  for (uint32_t key = 0; key < clip.keyCount(); ++key) frames.push_back(source(key));
-  return makeRelaySplats(clip, std::move(frames), {settings_json_, {}});
+  return makeRelaySplats(keyFrameClip(options_, *views_), relayResult(ended().model()),
+                         {settings_json_, {}});
 }
 
 void FitSession::saveReport(const std::string& path) const {

@@ -26,46 +26,47 @@ KeyFrameClip clipOf(const RelayAssetHead& head) {
           static_cast<KeyFrameBlend>(head.blend)};
 }
 
-void requireKeyFrames(const KeyFrameClip& clip, size_t count, const std::string& what,
-                      ErrorCode code) {
-  if (count == clip.keyCount()) return;
-  fail(code, what + " has " + std::to_string(count) + " key frames; of its frames it needs " +
-                 std::to_string(clip.keyCount()));
-}
-
-/// Key frames of a file, of which a few are at hand.
-class StoredKeyFrames {
+/// Key frames from a source, of which a few are at hand.
+class KeptKeyFrames {
  public:
-  StoredKeyFrames(std::shared_ptr<const RelayAsset> asset, std::string path)
-      : asset_(std::move(asset)), path_(std::move(path)) {}
+  explicit KeptKeyFrames(KeyFrameSource source) : source_(std::move(source)) {}
 
   std::shared_ptr<const KeyFrame> frame(uint32_t key) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const auto& [known, frame] : kept_) {
       if (known == key) return frame;
     }
-    try {
-      auto frame = std::make_shared<const KeyFrame>(
-          keyFrameOfTensors(asset_->key(key), "", shapeOf(asset_->head())));
-      if (frame->scaffold.size() != asset_->head().anchor_counts[key]) {
-        fail(ErrorCode::kFormat,
-             "key frame " + std::to_string(key) + " has " + std::to_string(frame->scaffold.size()) +
-                 " anchors; " + std::to_string(asset_->head().anchor_counts[key]) + " are needed");
-      }
-      kept_.emplace_back(key, frame);
-      if (kept_.size() > kKeptKeyFrames) kept_.pop_front();
-      return frame;
-    } catch (const Error& error) {
-      fail(error.code(), path_ + ": " + error.what());
-    }
+    std::shared_ptr<const KeyFrame> frame = source_(key);
+    kept_.emplace_back(key, frame);
+    if (kept_.size() > kKeptKeyFrames) kept_.pop_front();
+    return frame;
   }
 
  private:
-  std::shared_ptr<const RelayAsset> asset_;
-  std::string path_;
+  KeyFrameSource source_;
   mutable std::mutex mutex_;
   mutable std::deque<std::pair<uint32_t, std::shared_ptr<const KeyFrame>>> kept_;
 };
+
+KeyFrameSource keptFrames(KeyFrameSource source) {
+  return [kept = std::make_shared<const KeptKeyFrames>(std::move(source))](uint32_t key) {
+    return kept->frame(key);
+  };
+}
+
+std::shared_ptr<const KeyFrame> frameOfFile(const RelayAsset& asset, const std::string& path,
+                                            uint32_t key) {
+  try {
+    auto frame = std::make_shared<const KeyFrame>(
+        keyFrameOfTensors(asset.key(key), "", shapeOf(asset.head())));
+    if (frame->scaffold.size() == asset.head().anchor_counts[key]) return frame;
+    fail(ErrorCode::kFormat, "key frame " + std::to_string(key) + " has " +
+                                 std::to_string(frame->scaffold.size()) + " anchors; " +
+                                 std::to_string(asset.head().anchor_counts[key]) + " are needed");
+  } catch (const Error& error) {
+    fail(error.code(), path + ": " + error.what());
+  }
+}
 
 class RelayDecoder final : public Decoder {
  public:
@@ -125,11 +126,9 @@ class RelaySplats final : public SplatModel {
   }
 
   void save(const std::string& path) const override {
-    std::vector<TensorTable> keys;
-    for (uint32_t key = 0; key < head_.anchor_counts.size(); ++key) {
-      keys.push_back(tensorsOfKeyFrame(*decoder_.frames()(key), ""));
-    }
-    writeRelayAsset(head_, keys, path);
+    writeRelayAsset(
+        head_, [this](uint32_t key) { return tensorsOfKeyFrame(*decoder_.frames()(key), ""); },
+        path);
   }
 
  protected:
@@ -150,49 +149,56 @@ class RelaySplats final : public SplatModel {
 
 }  // namespace
 
-std::shared_ptr<const SplatModel> makeRelaySplats(
-    const KeyFrameClip& clip, std::vector<std::shared_ptr<const KeyFrame>> frames,
-    ModelNotes notes) {
+std::shared_ptr<const SplatModel> makeRelaySplats(const KeyFrameClip& clip,
+                                                  const KeyFrameSource& frames, ModelNotes notes) {
   validate(clip);
-  requireKeyFrames(clip, frames.size(), "the clip", ErrorCode::kInvalidArgument);
   RelayAssetHead head;
   head.begin = clip.begin;
   head.frames_per_second = clip.frames_per_second;
   head.frame_count = clip.frame_count;
   head.spacing = clip.spacing;
   head.blend = static_cast<uint32_t>(clip.blend);
-  const ScaffoldParameters& first = frames.front()->scaffold;
-  head.gaussians = first.gaussians;
-  head.sh_degree = first.sh_degree;
-  head.colour_space = first.colour_space;
-  head.antialias = first.antialias;
   head.settings_json = std::move(notes.settings_json);
   head.extras = std::move(notes.extras);
   std::fill_n(head.bounds.begin(), 3, INFINITY);
   std::fill_n(head.bounds.begin() + 3, 3, -INFINITY);
-  for (const auto& frame : frames) {
-    head.anchor_counts.push_back(frame->scaffold.size());
-    if (frame->scaffold.size() == 0) {
+  for (uint32_t key = 0; key < clip.keyCount(); ++key) {
+    const std::shared_ptr<const KeyFrame> frame = frames(key);
+    if (!frame) {
+      fail(ErrorCode::kInvalidArgument, "the clip has " + std::to_string(key) +
+                                            " key frames; of its frames it needs " +
+                                            std::to_string(clip.keyCount()));
+    }
+    const ScaffoldParameters& scaffold = frame->scaffold;
+    head.gaussians = scaffold.gaussians;
+    head.sh_degree = scaffold.sh_degree;
+    head.colour_space = scaffold.colour_space;
+    head.antialias = scaffold.antialias;
+    head.anchor_counts.push_back(scaffold.size());
+    if (scaffold.size() == 0) {
       fail(ErrorCode::kInvalidArgument, "a key frame has 0 anchors; at least 1 is needed");
     }
-    for (size_t i = 0; i < frame->scaffold.positions.size(); ++i) {
-      const double value = static_cast<double>(frame->scaffold.positions[i]);
+    for (size_t i = 0; i < scaffold.positions.size(); ++i) {
+      const double value = static_cast<double>(scaffold.positions[i]);
       head.bounds[i % 3] = std::min(head.bounds[i % 3], value);
       head.bounds[3 + i % 3] = std::max(head.bounds[3 + i % 3], value);
     }
   }
-  return std::make_shared<const RelaySplats>(
-      std::move(head), [frames = std::move(frames)](uint32_t key) { return frames[key]; });
+  return std::make_shared<const RelaySplats>(std::move(head), keptFrames(frames));
 }
 
 std::shared_ptr<const SplatModel> readRelaySplats(const std::string& path, const ReadingAid&) {
   auto asset = std::make_shared<const RelayAsset>(path);
-  requireKeyFrames(clipOf(asset->head()), asset->head().anchor_counts.size(), path,
-                   ErrorCode::kFormat);
-  auto stored = std::make_shared<const StoredKeyFrames>(asset, path);
-  stored->frame(0);  // says now what is wrong with it
-  return std::make_shared<const RelaySplats>(asset->head(),
-                                             [stored](uint32_t key) { return stored->frame(key); });
+  const size_t count = asset->head().anchor_counts.size();
+  const uint32_t needed = clipOf(asset->head()).keyCount();
+  if (count != needed) {
+    fail(ErrorCode::kFormat, path + " has " + std::to_string(count) +
+                                 " key frames; of its frames it needs " + std::to_string(needed));
+  }
+  const KeyFrameSource frames =
+      keptFrames([asset, path](uint32_t key) { return frameOfFile(*asset, path, key); });
+  frames(0);  // says now what is wrong with it
+  return std::make_shared<const RelaySplats>(asset->head(), frames);
 }
 
 }  // namespace stipple

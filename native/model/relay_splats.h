@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "decode/anchors/key_frame.h"
 #include "model/splat_model.h"
@@ -9,10 +8,11 @@
 namespace stipple {
 
 /// The kind "relay": a long clip as anchors at key frames, each with its deformation, two of which
-/// are blended at a time. In: frames of all of the clip's key frames.
-/// Errors: kInvalidArgument for a clip and frames that do not fit together.
-std::shared_ptr<const SplatModel> makeRelaySplats(
-    const KeyFrameClip& clip, std::vector<std::shared_ptr<const KeyFrame>> frames,
-    ModelNotes notes = {});
+/// are blended at a time. In: frames, each of the clip's key frames, the same whenever it is asked
+/// for: a few of them are kept. Errors: kInvalidArgument for a clip and frames that do not fit
+/// together; those of frames.
+std::shared_ptr<const SplatModel> makeRelaySplats(const KeyFrameClip& clip,
+                                                  const KeyFrameSource& frames,
+                                                  ModelNotes notes = {});
 
 }  // namespace stipple

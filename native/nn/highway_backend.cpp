@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "nn/kernels/layer_kernel.h"
 #include "nn/kernels/panel_kernel.h"
 
@@ -42,6 +43,10 @@ class HighwayBackend : public MatrixBackend {
       }
       packed += inputs * strip;
     }
+  }
+
+  void packTurned(const uint16_t*, size_t, size_t, size_t, float*) const override {
+    fail(ErrorCode::kInternal, "highway has no products in bfloat16");
   }
 
   void multiply(const LinearPanel& panel, const float* packed, FactorPrecision) const override {

@@ -39,6 +39,23 @@ FactorPrecision precisionOf(const NetworkRun& run) {
   return backendOf(run).has(run.precision) ? run.precision : FactorPrecision::kFloat32;
 }
 
+void requirePrecision(FactorPrecision precision) {
+  const MatrixBackend& backend = defaultMatrixBackend();
+  if (backend.has(precision)) return;
+  std::string why, reason;
+  if (onednnBackend(&why) == nullptr) {
+    reason = "oneDNN cannot be loaded: " + why;
+  } else if (&backend != onednnBackend()) {
+    reason = "STIPPLE_MATRIX_BACKEND is \"" + std::string(backend.name()) +
+             "\", which multiplies in float32 alone";
+  } else {
+    reason = "the processor does not have the instructions AVX512_BF16; oneDNN uses " +
+             backend.instructionSets();
+  }
+  fail(ErrorCode::kUnavailable,
+       "matrix products in bfloat16 are asked for and not to be had here, because " + reason);
+}
+
 std::span<const MatrixBackend* const> matrixBackends() {
   static const std::vector<const MatrixBackend*> backends = [] {
     std::vector<const MatrixBackend*> all = {&highwayBackend()};

@@ -40,6 +40,10 @@ class MatrixBackend {
   /// wants. Out: packed [packedSize()].
   virtual void pack(const WeightTensor& weight, size_t inputs, size_t first_output, size_t outputs,
                     FactorPrecision precision, float* packed) const = 0;
+  /// The same of a weight in bfloat16 that lies turned around, [inputs, outputs] with `stride`
+  /// numbers from row to row, where the backend has products in bfloat16.
+  virtual void packTurned(const uint16_t* weight, size_t stride, size_t inputs, size_t outputs,
+                          float* packed) const = 0;
   virtual void multiply(const LinearPanel& panel, const float* packed,
                         FactorPrecision precision) const = 0;
 };
@@ -51,6 +55,8 @@ const MatrixBackend& defaultMatrixBackend();
 /// where it has no other.
 const MatrixBackend& backendOf(const NetworkRun& run);
 FactorPrecision precisionOf(const NetworkRun& run);
+/// Errors: kUnavailable, with the reason, where the default backend does not have it.
+void requirePrecision(FactorPrecision precision);
 /// All that work here, ours first: for tests and benchmarks.
 std::span<const MatrixBackend* const> matrixBackends();
 

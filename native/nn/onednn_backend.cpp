@@ -60,6 +60,15 @@ class OnednnBackend : public MatrixBackend {
     throwIfFailed(status);
   }
 
+  void packTurned(const uint16_t* from, size_t stride, size_t inputs, size_t outputs,
+                  float* packed) const override {
+    if (inputs == 0 || outputs == 0) return;
+    const StippleNnWeight weight = {inputs, outputs, kNnBfloat16};
+    StippleNnStatus status;
+    table_.pack_turned(&weight, from, stride, packed, &status);
+    throwIfFailed(status);
+  }
+
   void multiply(const LinearPanel& panel, const float* packed,
                 FactorPrecision precision) const override {
     if (panel.rows == 0 || panel.outputs == 0) return;

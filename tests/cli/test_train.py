@@ -99,6 +99,27 @@ def test_a_killed_training_goes_on_from_its_last_checkpoint(given, tmp_path):
     assert (tmp_path / 'result/weights.safetensors').exists()
 
 
+def test_products_in_bfloat16_learn_about_as_much(given, tmp_path, monkeypatch):
+    path = given(precision='bfloat16')
+    monkeypatch.setenv('STIPPLE_MATRIX_BACKEND', 'highway')
+    assert 'in bfloat16 are asked for and not to be had here, because STIPPLE_MATRIX_BACKEND' in error('train', path)
+    assert not (tmp_path / 'result').exists()
+    monkeypatch.delenv('STIPPLE_MATRIX_BACKEND')
+    process = subprocess.run([TOOL, 'train', path, '--json'], capture_output=True, text=True, timeout=300)
+    if 'not to be had here' in process.stderr:
+        pytest.skip(process.stderr.strip())
+    assert process.returncode == 0, process.stderr
+    seen = json.loads(process.stdout)
+    # As test_learns_objects_that_it_has_never_seen() in float32, which gets 16.5 dB.
+    assert seen['skipped_steps'] == 0 and seen['held_out_psnr_128_anchors'] > 15.5
+    settings = json.loads((tmp_path / 'result/report.json').read_text())['settings']
+    assert settings['precision'] == 'bfloat16' and settings['parts.1.loss_scale'] == 'dynamic'
+    # What was learned is run in float32, as any other weights.
+    monkeypatch.setenv('STIPPLE_MATRIX_BACKEND', 'highway')
+    ball = sorted((tmp_path / 'objects/balls').iterdir())[0]
+    run('encode', tmp_path / 'result/weights.safetensors', ball, tmp_path / 'ball.ply', '--anchors', '50')
+
+
 @pytest.mark.parametrize('changes, message', [
     ({'sed': 1}, "'sed' is not known; 'seed' is the nearest that is"),
     ({'network': {'head': 2}}, "'network.head' is not known; 'network.heads' is the nearest that is"),
@@ -115,6 +136,9 @@ def test_a_killed_training_goes_on_from_its_last_checkpoint(given, tmp_path):
     ({'network': {'head_width': 18}}, 'the width of a head is 18; a multiple of 4 is needed'),
     ({'parts': [{'stage': 'splats'}]}, "'parts.0.stage' is 'splats'; structure, attributes or joint is allowed"),
     ({'parts': [{'stage': 'joint', 'batch': 0}]}, 'part 0: the number of objects in a step is 0'),
+    ({'precision': 'float16'}, "'precision' is 'float16'; float32 or bfloat16 is allowed"),
+    ({'parts': [{'loss_scale': 'static'}]}, "'parts.0.loss_scale' is 'static'; none or dynamic is allowed"),
+    ({'parts': [{'loss_scale_start': 200}]}, 'part 0: the logarithm of the first scale of losses is 200'),
     ({'collection': 'nowhere'}, "nowhere' cannot be read"),
 ])
 def test_what_cannot_be_trained_is_refused(given, changes, message):

@@ -173,7 +173,8 @@ std::vector<std::string> relaySeeds(const fs::path& folder) {
     if (key == 1) frame.deformation = makeDeformation(shape, 2);
     keys.push_back(tensorsOfKeyFrame(frame, ""));
   }
-  writeRelayAsset(head, keys, (folder / "seed").string());
+  writeRelayAsset(
+      head, [&](uint32_t key) { return keys[key]; }, (folder / "seed").string());
   return {load(folder / "seed")};
 }
 

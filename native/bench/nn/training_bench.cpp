@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "base/random.h"
 #include "bench/comparison.h"
-#include "nn/linear.h"
+#include "bench/nn/large_layer.h"
 #include "train/networks/trained_gaussians.h"
 
 namespace stipple::bench {
@@ -17,39 +16,6 @@ namespace {
 constexpr int kRepeats = 7;
 constexpr size_t kWidth = 256, kHeads = 8, kBlocks = 4, kLatent = 16;
 constexpr uint32_t kGaussians = 8;
-/// Of the layer whose rate is what products may reach.
-constexpr size_t kLayerRows = 2048, kLayerWidth = 1024;
-
-std::vector<float> numbers(size_t count, uint64_t seed, float size) {
-  std::vector<float> made(count);
-  for (size_t i = 0; i < count; ++i) {
-    made[i] = size * (2 * unitFloat(keyedBits(seed, RandomUse::kNetworkStart, i)) - 1);
-  }
-  return made;
-}
-
-/// A layer that is only run, of the backend that networks use.
-class LargeLayer {
- public:
-  static constexpr double kOperations = 2.0 * kLayerRows * kLayerWidth * kLayerWidth;
-
-  LargeLayer() {
-    layout_.add("fc.weight", {kLayerWidth, kLayerWidth});
-    auto values = std::make_shared<const std::vector<float>>(numbers(layout_.size(), 1, 0.03f));
-    layer_ = Linear(layout_.table("benchmark", values), "fc", kLayerWidth, kLayerWidth,
-                    LinearBias::kNone);
-  }
-  void run() {
-    layer_.apply({}, kLayerRows, in_.data(), out_.data());
-    benchmark::DoNotOptimize(out_.data());
-  }
-
- private:
-  ParameterLayout layout_;
-  Linear layer_;
-  std::vector<float> in_ = numbers(kLayerRows * kLayerWidth, 2, 1.0f);
-  std::vector<float> out_ = std::vector<float>(kLayerRows * kLayerWidth);
-};
 
 /// Of `rows` tokens through linear layers with so many weights for each: forward, once more when a
 /// block is run again, and twice on the way back.
@@ -68,9 +34,9 @@ void splats(benchmark::State& state) {
   ParameterLayout layout;
   const TrainedGaussians network(layout, "gs.", {kHeads, kWidth / kHeads, kLatent, kBlocks, 4},
                                  kGaussians);
-  const std::vector<float> values = numbers(layout.size(), 3, 0.06f);
-  const std::vector<float> latent = numbers(tokens * kLatent, 4, 1.0f);
-  std::vector<float> points = numbers(rows * 3, 5, 0.5f);
+  const std::vector<float> values = layerNumbers(layout.size(), 3, 0.06f);
+  const std::vector<float> latent = layerNumbers(tokens * kLatent, 4, 1.0f);
+  std::vector<float> points = layerNumbers(rows * 3, 5, 0.5f);
   for (float& value : points) value += 0.5f;
   std::vector<float> gradients(layout.size()), by_latent(latent.size());
   const ContextRows context = {tokens, latent.data()};

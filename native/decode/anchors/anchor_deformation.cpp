@@ -38,6 +38,14 @@ AnchorDeformation makeDeformation(const HexPlaneShape& shape, uint32_t gaussians
   const std::array<size_t, 4> widths = {deformation.planes.featureWidth(), kHidden, kHidden,
                                         kOffsetsAt + size_t{gaussians} * 3};
   deformation.heads = Mlp(widths, shape.seed, 0.0f);
+  // What planes begin with is 1 on the mean. Behind the first layer it is 0, so that what the last
+  // one learns moves anchors by how their places differ, and not all of them alike.
+  LinearLayer& first = deformation.heads.layers().front();
+  for (size_t i = 0; i < first.inputs; ++i) {
+    for (size_t o = 0; o < first.outputs; ++o) {
+      first.biases[o] -= first.weights[i * first.outputs + o];
+    }
+  }
   double squares = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const double side = shape.highest[axis] - shape.lowest[axis];

@@ -50,6 +50,9 @@ TensorTable tensorsOfKeyFrame(const KeyFrame& frame, const std::string& prefix) 
   for (auto& [name, tensor] : tensorsOfScaffold(frame.scaffold)) {
     table[prefix + name] = std::move(tensor);
   }
+  if (frame.scaffold.coarsening > 0) {
+    table[prefix + "coarsening"] = {{1}, std::vector<double>{frame.scaffold.coarsening}};
+  }
   if (frame.scaffold.size() > 0) table[prefix + "blend"] = rowsOf(frame.blend, kBlendNumbers);
   if (!frame.deformation.isThere()) return table;
   const HexPlaneShape& shape = frame.deformation.planes.shape();
@@ -83,6 +86,13 @@ KeyFrame keyFrameOfTensors(const TensorTable& table, const std::string& prefix,
   }
   KeyFrame frame;
   frame.scaffold = scaffoldOfTensors(own, like);
+  if (own.contains("coarsening")) {
+    const std::vector<double>& coarsening = valuesOf<double>(own, "coarsening");
+    if (coarsening.size() != 1 || !(coarsening[0] >= 0 && coarsening[0] <= 1)) {
+      fail(ErrorCode::kFormat, "the key frame has a coarsening that is no number from 0 to 1");
+    }
+    frame.scaffold.coarsening = coarsening[0];
+  }
   frame.blend.resize(frame.scaffold.size() * kBlendNumbers);
   take(own, "blend", frame.blend);
   if (!own.contains("planes")) return frame;

@@ -93,7 +93,7 @@ void ScaffoldDecoder::forward(const AnchorArrays& anchors, size_t count, Scaffol
   cloud.antialias = scaffold.antialias;
   cloud.resize(tape.slots.size());
   const size_t higher = scaffold.higherCoefficients();
-  const double share = static_cast<double>(anchors.size()) / static_cast<double>(count);
+  const double share = static_cast<double>(scaffold.size()) / static_cast<double>(count);
   const auto growth = static_cast<float>(std::pow(share, scaffold.coarsening));
   const float* opacities = tape.opacity.output().data();
   const float* covariances = tape.covariance.output().data();
@@ -137,10 +137,10 @@ void ScaffoldDecoder::backward(const AnchorArrays& anchors, ScaffoldTape& tape,
   const size_t higher = scaffold.higherCoefficients();
   const size_t count = tape.anchors;
   AnchorArrays& by_anchors = gradients.anchors;
-  by_anchors.positions.assign(anchors.positions.size(), 0.0f);
-  by_anchors.features.assign(anchors.features.size(), 0.0f);
-  by_anchors.log_scales.assign(anchors.log_scales.size(), 0.0f);
-  by_anchors.offsets.assign(anchors.offsets.size(), 0.0f);
+  by_anchors.positions.assign(scaffold.positions.size(), 0.0f);
+  by_anchors.features.assign(scaffold.features.size(), 0.0f);
+  by_anchors.log_scales.assign(scaffold.log_scales.size(), 0.0f);
+  by_anchors.offsets.assign(scaffold.offsets.size(), 0.0f);
   auto& by_opacity = tape.raw_gradients[0];
   auto& by_covariance = tape.raw_gradients[1];
   auto& by_colour = tape.raw_gradients[2];

@@ -40,7 +40,7 @@ class ScaffoldDecoder final : public Decoder {
   const ScaffoldParameters& scaffold() const { return *scaffold_; }
 
   /// decode() of the first `count` anchors that can be followed by backward(). In: anchors: those
-  /// of the scaffold, or what a deformation has made of them.
+  /// of the scaffold, or what a deformation has made of the first of them.
   void forward(const AnchorArrays& anchors, size_t count, ScaffoldTape& tape,
                SplatCloud& cloud) const;
   /// Derivatives by the scaffold. In: what forward() left and gave; cloud_gradient: by the values

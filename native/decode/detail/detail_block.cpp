@@ -61,12 +61,15 @@ DetailBlock::DetailBlock(ParameterLayout& layout, const std::string& prefix,
                          const DetailBlockSizes& sizes)
     : sizes_(sizes),
       around_(layout, prefix + "cpe.0", sizes.channels, sizes.channels),
-      after_(layout, prefix + "cpe.1", sizes.channels, sizes.channels),
-      to_all_(layout, prefix + "attn.qkv", sizes.channels, 3 * sizes.channels),
-      out_(layout, prefix + "attn.proj", sizes.channels, sizes.channels),
+      after_(layout, prefix + "cpe.1", sizes.channels, sizes.channels, LinearBias::kNeeded,
+             layout.precision()),
+      to_all_(layout, prefix + "attn.qkv", sizes.channels, 3 * sizes.channels, LinearBias::kNeeded,
+              layout.precision()),
+      out_(layout, prefix + "attn.proj", sizes.channels, sizes.channels, LinearBias::kNeeded,
+           layout.precision()),
       mlp_(layout, prefix + "mlp.0.fc1", prefix + "mlp.0.fc2",
-           {sizes.channels, sizes.mlp_ratio * sizes.channels, sizes.channels},
-           Activation::kGeluErf) {}
+           {sizes.channels, sizes.mlp_ratio * sizes.channels, sizes.channels}, Activation::kGeluErf,
+           layout.precision()) {}
 
 std::vector<DetailBlock::Patch> DetailBlock::patchesOf(size_t points) const {
   std::vector<Patch> patches;

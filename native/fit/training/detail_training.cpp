@@ -91,7 +91,8 @@ void DetailWork::read() {
                                                   &progress_);
   trainer_ = std::make_unique<DetailTrainer>(
       config_.detail.sizes, config_.detail.schedule, config_.seed,
-      std::make_shared<const FittedShare>(fitted_, split_.learned_from), backends_, exchange_);
+      std::make_shared<const FittedShare>(fitted_, split_.learned_from), backends_,
+      TrainerRun{exchange_, config_.precision});
   judge_ = std::make_unique<DetailMeasure>(*backends_, *fitted_, config_.detail.schedule.views);
   history_.measured_on_held_out = !split_.held_out.empty();
   history_.part_names = {"detail"};

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -27,12 +28,16 @@ constexpr double kLargestWhole = 9007199254740992.0;
 }
 
 constexpr const char* kStageNames[] = {"structure", "attributes", "joint"};
+constexpr const char* kPrecisionNames[] = {"float32", "bfloat16"};
+constexpr const char* kLossScalingNames[] = {"none", "dynamic"};
 
 /// A place of a config that a key of its text sets.
 struct Setting {
   std::string name;
   std::function<void(const FlatJsonValue&)> set;
-  std::function<std::string()> json;  ///< its value as JSON; null: weights do not depend on it
+  /// Its value as JSON; null: weights do not depend on it. Empty: they do not as other settings
+  /// are.
+  std::function<std::string()> json;
 };
 
 std::string quoted(const std::string& text) {
@@ -85,16 +90,31 @@ Setting path(const std::string& name, std::string& place, const std::string& fol
   return {name, set, nullptr};
 }
 
-Setting stage(const std::string& name, AutoencoderStage& place) {
-  const auto set = [&place, name](const FlatJsonValue& given) {
+/// One of some names, in the order of the values that they stand for.
+template <class T>
+Setting choice(const std::string& name, T& place, std::span<const char* const> names) {
+  const auto set = [&place, name, names](const FlatJsonValue& given) {
     const std::string& text = textOf(given, name);
-    const auto* const found = std::find(std::begin(kStageNames), std::end(kStageNames), text);
-    if (found == std::end(kStageNames)) {
-      refuse("'" + name + "' is '" + text + "'; structure, attributes or joint is allowed");
+    const auto found = std::find(names.begin(), names.end(), text);
+    if (found == names.end()) {
+      std::string allowed;
+      for (size_t i = 0; i < names.size(); ++i) {
+        if (i > 0) allowed += i + 1 < names.size() ? ", " : " or ";
+        allowed += names[i];
+      }
+      refuse("'" + name + "' is '" + text + "'; " + allowed + " is allowed");
     }
-    place = static_cast<AutoencoderStage>(found - std::begin(kStageNames));
+    place = static_cast<T>(found - names.begin());
   };
-  return {name, set, [&place] { return quoted(stageName(place)); }};
+  return {name, set, [&place, names] { return quoted(names[static_cast<size_t>(place)]); }};
+}
+
+/// A setting that came later than others and that weights depend on where `matters` says so: what
+/// earlier versions wrote and what this one writes are the same elsewhere.
+Setting keptWhere(std::function<bool()> matters, Setting setting) {
+  const auto json = std::move(setting.json);
+  setting.json = [matters = std::move(matters), json] { return matters() ? json() : ""; };
+  return setting;
 }
 
 void addNetwork(AutoencoderSizes& sizes, std::vector<Setting>& list) {
@@ -109,8 +129,9 @@ void addNetwork(AutoencoderSizes& sizes, std::vector<Setting>& list) {
   list.push_back(number("network.leaf_level", sizes.leaf_level));
 }
 
-void addOptimiser(const std::string& at, WeightOptimiserOptions& optimiser,
-                  std::vector<Setting>& list) {
+/// In: precision, which decides what scale of losses is usual.
+void addOptimiser(const std::string& at, const FactorPrecision& precision,
+                  WeightOptimiserOptions& optimiser, std::vector<Setting>& list) {
   list.push_back(number(at + "learning_rate", optimiser.learning_rate));
   list.push_back(number(at + "beta1", optimiser.beta1));
   list.push_back(number(at + "beta2", optimiser.beta2));
@@ -122,14 +143,21 @@ void addOptimiser(const std::string& at, WeightOptimiserOptions& optimiser,
   list.push_back(number(at + "clip_buffer", optimiser.clip_buffer));
   list.push_back(number(at + "clip_percentile", optimiser.clip_percentile));
   list.push_back(number(at + "mean_decay", optimiser.mean_decay));
+  const auto is_said = [&optimiser, &precision] {
+    return optimiser.loss_scaling != LossScaling::kNone || precision != FactorPrecision::kFloat32;
+  };
+  list.push_back(
+      keptWhere(is_said, choice(at + "loss_scale", optimiser.loss_scaling, kLossScalingNames)));
+  list.push_back(keptWhere(is_said, number(at + "loss_scale_start", optimiser.loss_scale_start)));
+  list.push_back(keptWhere(is_said, number(at + "loss_scale_growth", optimiser.loss_scale_growth)));
 }
 
-void addFlow(FlowConfig& flow, std::vector<Setting>& list) {
+void addFlow(const FactorPrecision& precision, FlowConfig& flow, std::vector<Setting>& list) {
   list.push_back(number("flow.steps", flow.schedule.optimiser.total_steps));
   list.push_back(number("flow.batch", flow.schedule.batch));
   list.push_back(number("flow.image_dropout", flow.schedule.image_dropout));
   list.push_back(number("flow.time_mean", flow.schedule.time_mean));
-  addOptimiser("flow.", flow.schedule.optimiser, list);
+  addOptimiser("flow.", precision, flow.schedule.optimiser, list);
   list.push_back(number("flow.heads", flow.heads));
   list.push_back(number("flow.head_width", flow.head_width));
   list.push_back(number("flow.mlp_ratio", flow.mlp_ratio));
@@ -142,7 +170,7 @@ void addFlow(FlowConfig& flow, std::vector<Setting>& list) {
   list.push_back(number("flow.in_order", flow.in_order));
 }
 
-void addDetail(DetailConfig& detail, std::vector<Setting>& list) {
+void addDetail(const FactorPrecision& precision, DetailConfig& detail, std::vector<Setting>& list) {
   list.push_back(number("detail.steps", detail.schedule.optimiser.total_steps));
   list.push_back(number("detail.batch", detail.schedule.batch));
   list.push_back(number("detail.least_splats", detail.schedule.least_splats));
@@ -151,7 +179,7 @@ void addDetail(DetailConfig& detail, std::vector<Setting>& list) {
   list.push_back(number("detail.views", detail.schedule.views));
   list.push_back(number("detail.seen", detail.schedule.seen));
   list.push_back(number("detail.ssim", detail.schedule.ssim));
-  addOptimiser("detail.", detail.schedule.optimiser, list);
+  addOptimiser("detail.", precision, detail.schedule.optimiser, list);
   list.push_back(number("detail.heads", detail.sizes.heads));
   list.push_back(number("detail.head_width", detail.sizes.head_width));
   list.push_back(number("detail.layers", detail.sizes.layers));
@@ -164,10 +192,11 @@ void addDetail(DetailConfig& detail, std::vector<Setting>& list) {
   list.push_back(number("detail.fit_splats", detail.fit_splats));
 }
 
-void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setting>& list) {
+void addPart(const std::string& at, const FactorPrecision& precision, AutoencoderSchedule& part,
+             std::vector<Setting>& list) {
   WeightOptimiserOptions& optimiser = part.optimiser;
   AutoencoderLossWeights& weights = part.weights;
-  list.push_back(stage(at + "stage", part.stage));
+  list.push_back(choice(at + "stage", part.stage, kStageNames));
   list.push_back(number(at + "steps", optimiser.total_steps));
   list.push_back(number(at + "batch", part.batch));
   list.push_back(number(at + "tokens", part.most_tokens));
@@ -176,7 +205,7 @@ void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setti
   list.push_back(number(at + "most_anchors", part.most_anchors));
   list.push_back(number(at + "views", part.views));
   list.push_back(number(at + "surface", part.surface));
-  addOptimiser(at, optimiser, list);
+  addOptimiser(at, precision, optimiser, list);
   list.push_back(number(at + "weights.structure", weights.structure));
   list.push_back(number(at + "weights.divergence", weights.divergence));
   list.push_back(number(at + "weights.ssim", weights.ssim));
@@ -192,6 +221,8 @@ std::vector<Setting> settingsOf(TrainingConfig& config, const std::string& folde
   list.push_back(path("collection", config.collection, folder));
   list.push_back(path("out", config.out, folder));
   list.push_back(path("start", config.start, folder));
+  const auto is_narrow = [&config] { return config.precision != FactorPrecision::kFloat32; };
+  list.push_back(keptWhere(is_narrow, choice("precision", config.precision, kPrecisionNames)));
   list.push_back(number("seed", config.seed));
   list.push_back(number("held_out", config.held_out));
   // What is measured, and when, chooses the state that is kept.
@@ -201,13 +232,13 @@ std::vector<Setting> settingsOf(TrainingConfig& config, const std::string& folde
   list.push_back(unkept(number("image_bytes", config.objects.image_bytes)));
   list.push_back(number("points", config.objects.points));
   if (config.learns_detail) {
-    addDetail(config.detail, list);
+    addDetail(config.precision, config.detail, list);
     return list;
   }
   addNetwork(config.sizes, list);
-  addFlow(config.flow, list);
+  addFlow(config.precision, config.flow, list);
   for (size_t i = 0; i < config.parts.size(); ++i) {
-    addPart("parts." + std::to_string(i) + ".", config.parts[i], list);
+    addPart("parts." + std::to_string(i) + ".", config.precision, config.parts[i], list);
   }
   return list;
 }
@@ -277,6 +308,20 @@ std::string lastWord(const std::string& name) {
          (nearest.empty() ? "" : "; '" + nearest + "' is the nearest that is"));
 }
 
+/// What is usual depends on the precision: the released training scales losses where it has halves.
+void setPrecision(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
+                  TrainingConfig& config) {
+  for (const auto& [name, value] : entries) {
+    if (name == "precision") choice(name, config.precision, kPrecisionNames).set(value);
+  }
+  if (config.precision == FactorPrecision::kFloat32) return;
+  for (AutoencoderSchedule& part : config.parts) {
+    part.optimiser.loss_scaling = LossScaling::kDynamic;
+  }
+  config.flow.schedule.optimiser.loss_scaling = LossScaling::kDynamic;
+  config.detail.schedule.optimiser.loss_scaling = LossScaling::kDynamic;
+}
+
 /// Stages go first, since what else a part has not said depends on them.
 void setParts(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
               TrainingConfig& config) {
@@ -287,7 +332,7 @@ void setParts(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
     for (size_t i = 0; i < count; ++i) {
       if (name != "parts." + std::to_string(i) + ".stage") continue;
       AutoencoderStage given = AutoencoderStage::kStructure;
-      stage(name, given).set(value);
+      choice(name, given, kStageNames).set(value);
       config.parts[i] = usualPart(given);
     }
   }
@@ -297,6 +342,7 @@ void setParts(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
 void setAll(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
             const std::string& name, const std::string& folder, TrainingConfig& config) {
   setParts(entries, config);
+  setPrecision(entries, config);
   const auto says = [&](const char* begin) {
     return std::any_of(entries.begin(), entries.end(),
                        [&](const auto& entry) { return entry.first.rfind(begin, 0) == 0; });
@@ -447,10 +493,11 @@ std::string settingsJson(const TrainingConfig& config) {
   TrainingConfig copy = config;
   std::string json;
   for (const Setting& setting : settingsOf(copy, "")) {
-    if (setting.json == nullptr) continue;
+    const std::string value = setting.json == nullptr ? "" : setting.json();
+    if (value.empty()) continue;
     json.push_back(json.empty() ? '{' : ',');
     json.append(quoted(setting.name)).push_back(':');
-    json.append(setting.json());
+    json.append(value);
   }
   return json + "}";
 }

@@ -6,6 +6,7 @@
 
 #include "fit/training/collection.h"
 #include "generate/patch_condition.h"
+#include "nn/network_run.h"
 #include "train/detail/detail_trainer.h"
 #include "train/networks/autoencoder_trainer.h"
 #include "train/networks/flow_trainer.h"
@@ -41,6 +42,8 @@ struct TrainingConfig {
   std::string start;       ///< weights of another training that this one begins with; may be empty
   bool says_parts = false, says_network = false;  ///< in its text
   bool learns_detail = false;                     ///< the text has "detail", and neither of them
+  /// Of the factors of products in blocks of networks; all else is float32.
+  FactorPrecision precision = FactorPrecision::kFloat32;
   uint64_t seed = 1;
   uint64_t held_out = 8;  ///< every so-many-th object judges and is not learned from; 0: none
   uint64_t measured_objects = 16;      ///< of those, at most, while it runs

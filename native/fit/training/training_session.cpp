@@ -20,6 +20,7 @@
 #include "io/assets/weight_file.h"
 #include "io/bytes/input_file.h"
 #include "io/reports/training_report.h"
+#include "nn/matrix_backend.h"
 
 namespace stipple {
 
@@ -176,7 +177,7 @@ void TrainingSession::Work::read() {
   trainer = std::make_unique<AutoencoderTrainer>(
       config().sizes, config().parts, config().seed,
       std::make_shared<const CollectionShare>(collection, split.learned_from), session.backends_,
-      learnsParts(config()) ? session.exchange_ : nullptr);
+      TrainerRun{learnsParts(config()) ? session.exchange_ : nullptr, config().precision});
   if (!config().start.empty()) {
     trainer->start(trainer->networks().layout().read(openWeightFile(config().start)));
   }
@@ -280,7 +281,7 @@ void TrainingSession::Work::learnFlow() {
       flowSizes(wanted, config().sizes.latent_width), wanted.schedule, config().seed,
       std::make_shared<const FlowObjects>(collection, split.learned_from, trainer->networks(),
                                           values, options, &progress),
-      session.exchange_);
+      TrainerRun{session.exchange_, config().precision});
   if (!flow_state.empty()) flow->resume(flow_state);
   flow_state.clear();
   session.enter("Flow");
@@ -362,6 +363,7 @@ TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
       resumes_(resumes),
       exchange_(exchange ? std::move(exchange) : noExchange()) {
   validate(config_.sizes);
+  requirePrecision(config_.precision);
   for (size_t i = 0; i < config_.parts.size() && learnsParts(config_); ++i) {
     requireExamples(*exchange_, config_.parts[i].batch, ("part " + std::to_string(i)).c_str());
   }

@@ -33,8 +33,8 @@ class TrainingSession {
  public:
   /// Reads the config. Errors: kIo; those of parseTrainingConfig(); kInvalidArgument where a
   /// checkpoint is left and `resumes` is false, or none is there and it is true, and where a file
-  /// of another kind stands where results go. In: exchange: with the other processes; null: there
-  /// are none.
+  /// of another kind stands where results go; kUnavailable (requirePrecision()). In: exchange: with
+  /// the other processes; null: there are none.
   TrainingSession(std::shared_ptr<const BackendFactory> backends, const std::string& config_path,
                   bool resumes, std::shared_ptr<GradientExchange> exchange = nullptr);
 

@@ -63,7 +63,8 @@ double numberOf(const Json& clip, const char* key, const std::string& path) {
 
 }  // namespace
 
-void writeRelayAsset(const RelayAssetHead& head, const std::vector<TensorTable>& keys,
+void writeRelayAsset(const RelayAssetHead& head,
+                     const std::function<TensorTable(uint32_t number)>& key,
                      const std::string& path) {
   validateHead(head, "asset", ErrorCode::kInvalidArgument);
   SafeTensorsWriter file;
@@ -83,8 +84,17 @@ void writeRelayAsset(const RelayAssetHead& head, const std::vector<TensorTable>&
   file.add(kCounts, head.anchor_counts, 1);
   const Tensor bounds{{2, 3}, std::vector<double>(head.bounds.begin(), head.bounds.end())};
   file.add(kBounds, bounds);
-  for (uint32_t key = 0; key < keys.size(); ++key) {
-    for (const auto& [name, tensor] : keys[key]) file.add(prefixOf(key) + name, tensor);
+  // Names sort by key frames, so that each is fetched once for the header and once for its values.
+  uint32_t number = 0;
+  TensorTable kept;
+  for (uint32_t k = 0; k < head.anchor_counts.size(); ++k) {
+    kept = key(number = k);
+    for (const auto& [name, tensor] : kept) {
+      file.addLater(prefixOf(k) + name, tensor, [&, k, name = name]() -> const Tensor& {
+        if (number != k) kept = key(number = k);
+        return kept.at(name);
+      });
+    }
   }
   addAssetExtras(file, head.extras);
   file.write(path);

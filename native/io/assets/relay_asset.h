@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,9 +30,11 @@ struct RelayAssetHead {
   AssetExtras extras;                   ///< of the file that it was read from
 };
 
-/// `.stipple.safetensors`, version 1, kind "relay". In: keys: tensors of each key frame.
-/// Errors: kIo; kInvalidArgument for heads that do not fit the key frames.
-void writeRelayAsset(const RelayAssetHead& head, const std::vector<TensorTable>& keys,
+/// `.stipple.safetensors`, version 1, kind "relay". In: key: tensors of a key frame, the same each
+/// time that it is asked for; one key frame at a time is kept.
+/// Errors: kIo; kInvalidArgument for heads that do not fit the key frames; those of key.
+void writeRelayAsset(const RelayAssetHead& head,
+                     const std::function<TensorTable(uint32_t number)>& key,
                      const std::string& path);
 
 /// An asset whose key frames are read when they are wanted. Errors: kIo, kFormat, kUnsupported.

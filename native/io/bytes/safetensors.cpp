@@ -278,7 +278,7 @@ void SafeTensorsWriter::addEntry(const std::string& name, const char* dtype, uin
                                           " values; a multiple of " + std::to_string(width) +
                                           " is needed");
   }
-  Entry entry{dtype, {count / width}, data, count * value_bytes};
+  Entry entry{dtype, {count / width}, data, count * value_bytes, {}};
   if (width > 1) entry.shape.push_back(width);
   entries_[name] = std::move(entry);
 }
@@ -308,14 +308,36 @@ void SafeTensorsWriter::add(const std::string& name, const Tensor& tensor) {
                                                 std::to_string(values.size()) +
                                                 " values for the shape " + shapeText(tensor.shape));
         }
-        entries_[name] = {dtypeName<T>(), tensor.shape, values.data(), values.size() * sizeof(T)};
+        entries_[name] = {
+            dtypeName<T>(), tensor.shape, values.data(), values.size() * sizeof(T), {}};
       },
       tensor.values);
 }
 
+void SafeTensorsWriter::addLater(const std::string& name, const Tensor& like,
+                                 std::function<const Tensor&()> values) {
+  add(name, like);
+  entries_[name].data = nullptr;
+  entries_[name].fetch = std::move(values);
+}
+
+const void* SafeTensorsWriter::Entry::values(const std::string& name) const {
+  if (!fetch) return data;
+  return std::visit(
+      [&](const auto& fetched) -> const void* {
+        using T = typename std::decay_t<decltype(fetched)>::value_type;
+        if (dtype != dtypeName<T>() || bytes != fetched.size() * sizeof(T)) {
+          fail(ErrorCode::kInvalidArgument,
+               "tensor '" + name + "' has changed its size since it was added");
+        }
+        return fetched.data();
+      },
+      fetch().values);
+}
+
 void SafeTensorsWriter::carry(const std::string& name, const CarriedTensor& tensor) {
   entries_.emplace(name,
-                   Entry{tensor.dtype, tensor.shape, tensor.bytes.data(), tensor.bytes.size()});
+                   Entry{tensor.dtype, tensor.shape, tensor.bytes.data(), tensor.bytes.size(), {}});
 }
 
 void SafeTensorsWriter::addChecksum() {
@@ -348,13 +370,13 @@ void SafeTensorsWriter::write(const std::string& path) const {
     Checksum sum;
     sum.add(&length, sizeof(length));
     sum.add(text.data(), text.size());
-    for (const auto& [name, entry] : entries_) sum.add(entry.data, entry.bytes);
+    for (const auto& [name, entry] : entries_) sum.add(entry.values(name), entry.bytes);
     text.replace(checksumPlace(text), kChecksumDigits, hexadecimal(sum.value()));
   }
   OutputFile file(path);
   file.write(&length, sizeof(length));
   file.write(text.data(), text.size());
-  for (const auto& [name, entry] : entries_) file.write(entry.data, entry.bytes);
+  for (const auto& [name, entry] : entries_) file.write(entry.values(name), entry.bytes);
   file.commit();
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -47,8 +48,8 @@ class SafeTensorsReader {
   std::vector<uint64_t> readUint64s(const std::string& name, uint64_t width) const;
   /// A tensor of one of the types that Tensor has, whatever its shape. Errors: kFormat.
   Tensor readTensor(const std::string& name) const;
-  /// Whether the bytes of the file are those that SafeTensorsWriter::addChecksum() saw. In: needs_one,
-  /// whether a file without a checksum is wrong. Reads the whole file. Errors: kIo.
+  /// Whether the bytes of the file are those that SafeTensorsWriter::addChecksum() saw. In:
+  /// needs_one, whether a file without a checksum is wrong. Reads the whole file. Errors: kIo.
   bool checksumIsRight(bool needs_one) const;
   /// The tensors that nobody has read yet.
   std::map<std::string, CarriedTensor> readOthers() const;
@@ -73,6 +74,9 @@ class SafeTensorsWriter {
   void add(const std::string& name, const std::vector<uint32_t>& values, uint64_t width);
   void add(const std::string& name, const std::vector<uint64_t>& values, uint64_t width);
   void add(const std::string& name, const Tensor& tensor);
+  /// Adds a tensor whose values are fetched when it is written, so that not all are in memory. In:
+  /// like: of the same type and shape; values, which may be called more than once: the tensor.
+  void addLater(const std::string& name, const Tensor& like, std::function<const Tensor&()> values);
   /// Writes a tensor as it is, where none of this name has been added.
   void carry(const std::string& name, const CarriedTensor& tensor);
   /// Writes metadata where the key has no value yet.
@@ -82,7 +86,8 @@ class SafeTensorsWriter {
   /// Adds a number to the metadata that a change of any byte of the file, its own included, makes
   /// wrong.
   void addChecksum();
-  /// Errors: kIo; the old file stays.
+  /// Errors: kIo; kInvalidArgument for values that are fetched and differ from their shape; the old
+  /// file stays.
   void write(const std::string& path) const;
 
  private:
@@ -91,6 +96,10 @@ class SafeTensorsWriter {
     std::vector<uint64_t> shape;
     const void* data;
     size_t bytes;
+    std::function<const Tensor&()> fetch = {};  ///< in place of data
+
+    /// Errors: kInvalidArgument.
+    const void* values(const std::string& name) const;
   };
   void addEntry(const std::string& name, const char* dtype, uint64_t width, const void* data,
                 size_t value_bytes, size_t count);

@@ -96,12 +96,14 @@ Type typeOf(uint32_t precision) {
   return precision == kNnBfloat16 ? Type::bf16 : Type::f32;
 }
 
-/// weight^T [inputs, outputs] as it lies, row by row of the weight.
-dnnl::memory::desc transposed(const StippleNnWeight& weight) {
+/// weight^T [inputs, outputs] as it lies: numbers from input to input, and from output to output.
+dnnl::memory::desc transposed(const StippleNnWeight& weight, uint64_t input_stride,
+                              uint64_t output_stride) {
   const auto inputs = static_cast<dnnl::memory::dim>(weight.inputs);
   const auto outputs = static_cast<dnnl::memory::dim>(weight.outputs);
   return {dnnl::memory::dims{inputs, outputs}, typeOf(weight.precision),
-          dnnl::memory::dims{1, inputs}};
+          dnnl::memory::dims{static_cast<dnnl::memory::dim>(input_stride),
+                             static_cast<dnnl::memory::dim>(output_stride)}};
 }
 
 dnnl::matmul::primitive_desc describe(const dnnl::memory::desc& in,
@@ -235,6 +237,14 @@ void* writable(const void* memory) {
   return const_cast<void*>(memory);
 }
 
+void pack(const StippleNnWeight& weight, const dnnl::memory::desc& lying, const void* values,
+          void* packed) {
+  dnnl::memory from(lying, engine(), writable(values));
+  dnnl::memory to(keptForm(weight), engine(), packed);
+  dnnl::reorder(from, to).execute(stream(), from, to);
+  stream().wait();
+}
+
 extern "C" {
 
 const char* stipple_nn_instruction_set(void) {
@@ -282,12 +292,12 @@ uint64_t stipple_nn_packed_bytes(const StippleNnWeight* weight, StippleNnStatus*
 
 void stipple_nn_pack(const StippleNnWeight* weight, const void* values, void* packed,
                      StippleNnStatus* status) {
-  guard(status, [&] {
-    dnnl::memory from(transposed(*weight), engine(), writable(values));
-    dnnl::memory to(keptForm(*weight), engine(), packed);
-    dnnl::reorder(from, to).execute(stream(), from, to);
-    stream().wait();
-  });
+  guard(status, [&] { pack(*weight, transposed(*weight, 1, weight->inputs), values, packed); });
+}
+
+void stipple_nn_pack_turned(const StippleNnWeight* weight, const void* values, uint64_t stride,
+                            void* packed, StippleNnStatus* status) {
+  guard(status, [&] { pack(*weight, transposed(*weight, stride, 1), values, packed); });
 }
 
 void stipple_nn_multiply(const StippleNnWeight* weight, const StippleNnProduct* product,
@@ -325,7 +335,8 @@ void stipple_nn_multiply(const StippleNnWeight* weight, const StippleNnProduct* 
 extern "C" const StippleNnTable* stipple_nn_table(uint32_t version) {
   static const StippleNnTable kTable = {kNnTableVersion,          stipple_nn_instruction_set,
                                         stipple_nn_has_precision, stipple_nn_packed_bytes,
-                                        stipple_nn_pack,          stipple_nn_multiply};
+                                        stipple_nn_pack,          stipple_nn_pack_turned,
+                                        stipple_nn_multiply};
   return version == kNnTableVersion ? &kTable : nullptr;
 }
 

@@ -8,7 +8,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kNnTableVersion = 2;
+constexpr uint32_t kNnTableVersion = 3;
 
 extern "C" {
 
@@ -51,6 +51,9 @@ struct StippleNnTable {
   /// In: values [outputs, inputs] in the precision of the weight. Out: packed [packed_bytes].
   void (*pack)(const StippleNnWeight* weight, const void* values, void* packed,
                StippleNnStatus* status);
+  /// The same of values that lie as [inputs, outputs], `stride` numbers from row to row.
+  void (*pack_turned)(const StippleNnWeight* weight, const void* values, uint64_t stride,
+                      void* packed, StippleNnStatus* status);
   /// On the calling thread alone.
   void (*multiply)(const StippleNnWeight* weight, const StippleNnProduct* product,
                    const void* packed, StippleNnStatus* status);

@@ -5,8 +5,13 @@
 #include <utility>
 
 #include "base/error.h"
+#include "nn/matrix_backend.h"
 
 namespace stipple {
+
+ParameterLayout::ParameterLayout(FactorPrecision precision) : precision_(precision) {
+  requirePrecision(precision);
+}
 
 size_t ParameterLayout::add(const std::string& name, std::vector<uint64_t> shape) {
   for (const Parameter& other : parameters_) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "data/weight_table.h"
+#include "nn/network_run.h"
 
 namespace stipple {
 
@@ -24,6 +25,12 @@ struct Parameter {
 /// machines see one array, and the same layers run with any of them.
 class ParameterLayout {
  public:
+  /// In: precision: of the factors of products in blocks of the networks that add their tensors to
+  /// it; what reads numbers from outside and what says them multiplies in float32. Errors:
+  /// kUnavailable (requirePrecision()).
+  explicit ParameterLayout(FactorPrecision precision = FactorPrecision::kFloat32);
+
+  FactorPrecision precision() const { return precision_; }
   /// Returns where the tensor begins. Errors: kInternal for a name that is there already.
   size_t add(const std::string& name, std::vector<uint64_t> shape);
 
@@ -39,6 +46,7 @@ class ParameterLayout {
                     std::shared_ptr<const std::vector<float>> values) const;
 
  private:
+  FactorPrecision precision_;
   std::vector<Parameter> parameters_;
   size_t size_ = 0;
 };

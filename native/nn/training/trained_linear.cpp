@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "nn/scratch.h"
 #include "nn/training/column_sums.h"
+#include "nn/training/narrow_product.h"
 #include "nn/training/packed_product.h"
 
 namespace stipple {
@@ -14,30 +15,31 @@ constexpr size_t kGrain = 1 << 14;
 }  // namespace
 
 TrainedLinear::TrainedLinear(ParameterLayout& layout, const std::string& name, size_t inputs,
-                             size_t outputs, LinearBias bias)
+                             size_t outputs, LinearBias bias, FactorPrecision precision)
     : inputs_(inputs),
       outputs_(outputs),
       weight_(layout.add(name + ".weight", {outputs, inputs})),
-      has_bias_(bias == LinearBias::kNeeded) {
+      has_bias_(bias == LinearBias::kNeeded),
+      precision_(precision) {
   if (has_bias_) bias_ = layout.add(name + ".bias", {outputs});
 }
 
 void TrainedLinear::apply(std::span<const float> values, size_t rows, const float* in,
                           float* out) const {
-  multiplyPacked({rows, inputs_, outputs_}, {in, inputs_}, {values.data() + weight_, 1, inputs_},
-                 {out, outputs_}, has_bias_ ? values.data() + bias_ : nullptr);
+  const float* weight = values.data() + weight_;
+  const float* bias = has_bias_ ? values.data() + bias_ : nullptr;
+  if (precision_ == FactorPrecision::kBfloat16) {
+    return applyNarrow({rows, inputs_, outputs_}, in, weight, bias, out);
+  }
+  multiplyPacked({rows, inputs_, outputs_}, {in, inputs_}, {weight, 1, inputs_}, {out, outputs_},
+                 bias);
 }
 
 void TrainedLinear::backward(std::span<const float> values, size_t rows, const float* in,
                              const float* out_gradient, std::span<float> gradients,
                              float* in_gradient) const {
-  Scratch made(inputs_ * outputs_);
-  multiplyPacked({outputs_, rows, inputs_}, {out_gradient, 1, outputs_}, {in, inputs_},
-                 {made.data(), inputs_});
+  const float* weight = values.data() + weight_;
   float* weight_gradient = gradients.data() + weight_;
-  parallelFor(inputs_ * outputs_, kGrain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) weight_gradient[i] += made.data()[i];
-  });
   if (has_bias_)
     addColumnSums(
         rows, outputs_,
@@ -47,9 +49,19 @@ void TrainedLinear::backward(std::span<const float> values, size_t rows, const f
           }
         },
         gradients.data() + bias_);
+  if (precision_ == FactorPrecision::kBfloat16) {
+    return backwardNarrow({rows, inputs_, outputs_}, in, weight, out_gradient, weight_gradient,
+                          in_gradient);
+  }
+  Scratch made(inputs_ * outputs_);
+  multiplyPacked({outputs_, rows, inputs_}, {out_gradient, 1, outputs_}, {in, inputs_},
+                 {made.data(), inputs_});
+  parallelFor(inputs_ * outputs_, kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) weight_gradient[i] += made.data()[i];
+  });
   if (in_gradient == nullptr) return;
-  multiplyPacked({rows, outputs_, inputs_}, {out_gradient, outputs_},
-                 {values.data() + weight_, inputs_}, {in_gradient, inputs_});
+  multiplyPacked({rows, outputs_, inputs_}, {out_gradient, outputs_}, {weight, inputs_},
+                 {in_gradient, inputs_});
 }
 
 }  // namespace stipple

@@ -3,9 +3,9 @@
 namespace stipple {
 
 TrainedMlp::TrainedMlp(ParameterLayout& layout, const std::string& first, const std::string& second,
-                       const Widths& widths, Activation activation)
-    : first_(layout, first, widths.inputs, widths.hidden),
-      second_(layout, second, widths.hidden, widths.outputs),
+                       const Widths& widths, Activation activation, FactorPrecision precision)
+    : first_(layout, first, widths.inputs, widths.hidden, LinearBias::kNeeded, precision),
+      second_(layout, second, widths.hidden, widths.outputs, LinearBias::kNeeded, precision),
       activation_(activation) {}
 
 void TrainedMlp::apply(std::span<const float> values, size_t rows, const float* in, Tape& tape,

@@ -22,9 +22,10 @@ class TrainedMlp {
   };
 
   TrainedMlp() = default;
-  /// Adds the tensors of both layers, by their names.
+  /// Adds the tensors of both layers, by their names. In: precision, as TrainedLinear has it.
   TrainedMlp(ParameterLayout& layout, const std::string& first, const std::string& second,
-             const Widths& widths, Activation activation);
+             const Widths& widths, Activation activation,
+             FactorPrecision precision = FactorPrecision::kFloat32);
 
   size_t outputs() const { return second_.outputs(); }
   /// In: in [rows, inputs]. Out: out [rows, outputs], apart from `in`.

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "base/stopwatch.h"
+#include "train/anchors/relay_parts.h"
 #include "train/anchors/relay_segments.h"
 #include "train/anchors/relay_work.h"
 #include "train/anchors/scaffold_steps.h"
@@ -26,8 +27,12 @@ namespace {
 
 /// Weights of growth by level at the begin of a segment; they rise to 1 at its end.
 constexpr std::array<double, 3> kLevelWeights = {1, 0.5, 0.25};
-/// Of a window, the share of steps in which it is asked what anchors are worth.
-constexpr double kWorthFrom = 0.8;
+/// Of a window, the share of steps that draw fewer anchors. It has a few hundred steps, and what
+/// smaller budgets ask for was learned by the global anchors.
+constexpr double kBudgetShare = 0.25;
+/// Of a window, the share of the rates of anchors: they are what the key frame has made them, and
+/// begin without moments.
+constexpr double kWindowRates = 0.3;
 /// Budgets that are measured, by octaves.
 constexpr int kMeasuredOctaves = 2;
 /// Key frames that are kept at hand for drawing.
@@ -41,8 +46,8 @@ class RelayModel final : public FitModel {
       : options_(options),
         voxel_(voxel),
         times_(std::move(times)),
-        segments_(relaySegments(options.iterations, options.clip)),
-        store_(std::move(store)),
+        parts_(std::make_shared<RelayParts>(
+            std::move(store), relaySegments(options.iterations, options.clip), shapeOf(start))),
         anchor_counts_(options.clip.keyCount(), start.scaffold->size()),
         pass_(backends.makeViewPass()) {
     work_.state = std::move(start);
@@ -54,7 +59,7 @@ class RelayModel final : public FitModel {
 
   std::optional<size_t> viewAt(uint64_t iteration) const override {
     const size_t index = segmentAt(iteration);
-    const RelaySegment& segment = segments_[index];
+    const RelaySegment& segment = segments()[index];
     if (viewed_segment_ != index) {
       viewed_segment_ = index;
       viewed_ = viewsOfSegment(segment, options_.clip, times_);
@@ -66,7 +71,7 @@ class RelayModel final : public FitModel {
   StepReport step(const FitMoment& moment, const StepView& view, ViewEvaluator*,
                   Progress* progress) override {
     enter(segmentAt(steps_));
-    const RelaySegment& segment = segments_[*entered_];
+    const RelaySegment& segment = segments()[*entered_];
     const FitMoment local = segment.local(momentOf(moment));
     StepReport report;
     if (segment.stage == RelayStage::kBlend) {
@@ -108,7 +113,7 @@ class RelayModel final : public FitModel {
 
   void restore(const TensorTable& table) override {
     const auto at = takeValues<uint64_t>(table, "relay.steps", 2, 2);
-    if (at[0] > options_.iterations + segments_.size() || at[1] > segments_.size()) {
+    if (at[0] > options_.iterations + segments().size() || at[1] > segments().size()) {
       fail(ErrorCode::kFormat, "the checkpoint is of a fit of another length");
     }
     RelayWork work = workOf(table, work_);
@@ -119,8 +124,8 @@ class RelayModel final : public FitModel {
     entered_.reset();
     if (at[1] > 0) entered_ = static_cast<size_t>(at[1] - 1);
     pair_ = {};
-    if (entered_ && segments_[*entered_].stage == RelayStage::kBlend && !work_.blends.empty()) {
-      loadPair(segments_[*entered_].key);
+    if (entered_ && segments()[*entered_].stage == RelayStage::kBlend && !work_.blends.empty()) {
+      loadPair(segments()[*entered_].key);
       for (size_t i = 0; i < 2; ++i) pair_[i]->blend = work_.blends[i];
     }
     forget();
@@ -138,21 +143,40 @@ class RelayModel final : public FitModel {
     for (const auto& [known, frame] : shown_) {
       if (known == key) return frame;
     }
-    auto frame = std::make_shared<KeyFrame>(load(key));
-    if (!isFinished(RelayStage::kGlobal, key)) return frame;  // it changes with every step
-    for (uint32_t pair = key > 0 ? key - 1 : 0; pair <= key; ++pair) takeBlend(pair, key, *frame);
+    std::optional<KeyFrame> finished = parts_->latest(key, steps_);
+    if (!finished) return std::make_shared<const KeyFrame>(keyFrameOf(work_));  // it changes yet
+    auto frame = std::make_shared<const KeyFrame>(std::move(*finished));
     if (shown_.size() >= kShownKeyFrames) shown_.erase(shown_.begin());
     shown_.emplace_back(key, frame);
     return frame;
   }
 
+  /// latest() of the fit as it is now, for as long as anybody has it.
+  KeyFrameSource result() const {
+    std::shared_ptr<const KeyFrame> under_way;
+    if (!parts_->isFinished(RelayStage::kGlobal, 0, steps_)) {
+      under_way = std::make_shared<const KeyFrame>(keyFrameOf(work_));
+    }
+    return [parts = parts_, steps = steps_, under_way](uint32_t key) {
+      if (under_way) return under_way;
+      return std::make_shared<const KeyFrame>(*parts->latest(key, steps));
+    };
+  }
+
  private:
+  static ScaffoldShape shapeOf(const ScaffoldState& state) {
+    const ScaffoldParameters& scaffold = *state.scaffold;
+    return {scaffold.gaussians, scaffold.sh_degree, scaffold.colour_space, scaffold.antialias, 0};
+  }
+
+  const std::vector<RelaySegment>& segments() const { return parts_->segments(); }
+
   size_t segmentAt(uint64_t steps) const {
     const auto found =
-        std::upper_bound(segments_.begin(), segments_.end(), steps,
+        std::upper_bound(segments().begin(), segments().end(), steps,
                          [](uint64_t at, const RelaySegment& one) { return at < one.end; });
     return static_cast<size_t>(
-        std::min<std::ptrdiff_t>(found - segments_.begin(), std::ssize(segments_) - 1));
+        std::min<std::ptrdiff_t>(found - segments().begin(), std::ssize(segments()) - 1));
   }
 
   /// Segments may take a few steps more than the fit has, where it has hardly any: the last one is
@@ -160,57 +184,6 @@ class RelayModel final : public FitModel {
   FitMoment momentOf(FitMoment moment) const {
     moment.iteration = steps_ + 1;
     return moment;
-  }
-
-  static std::string nameOf(RelayStage stage, uint32_t key) {
-    if (stage == RelayStage::kGlobal) return "global";
-    return (stage == RelayStage::kBlend ? "pair" : "key") + std::to_string(key) + ".stage" +
-           std::to_string(static_cast<uint32_t>(stage));
-  }
-
-  TensorTable need(RelayStage stage, uint32_t key) const {
-    std::optional<TensorTable> table = store_->get(nameOf(stage, key));
-    if (table) return std::move(*table);
-    fail(ErrorCode::kFormat,
-         "the fit cannot go on: of its key frames, '" + nameOf(stage, key) + "' is not there");
-  }
-
-  ScaffoldShape shape() const {
-    const ScaffoldParameters& scaffold = *work_.state.scaffold;
-    return {scaffold.gaussians, scaffold.sh_degree, scaffold.colour_space, scaffold.antialias, 0};
-  }
-
-  /// The newest that there is of a key frame, without blending of its own.
-  KeyFrame load(uint32_t key) const {
-    for (const RelayStage stage :
-         {RelayStage::kWindow, RelayStage::kKeyFrame, RelayStage::kGlobal}) {
-      if (!isFinished(stage, key)) continue;
-      return keyFrameOfTensors(need(stage, key), "", shape());
-    }
-    return keyFrameOf(work_);  // the global anchors, which are under way
-  }
-
-  bool isFinished(RelayStage stage, uint32_t key) const {
-    for (const RelaySegment& segment : segments_) {
-      if (segment.stage == stage && (segment.key == key || stage == RelayStage::kGlobal)) {
-        return segment.end <= steps_;
-      }
-    }
-    return false;
-  }
-
-  /// Of pair `pair`, what belongs to the key frame: forward numbers to its first, backward ones to
-  /// its second.
-  void takeBlend(uint32_t pair, uint32_t key, KeyFrame& frame) const {
-    if (!isFinished(RelayStage::kBlend, pair)) return;
-    const TensorTable table = need(RelayStage::kBlend, pair);
-    const bool is_first = pair == key;
-    const std::vector<float> blend = takeValues<float>(table, is_first ? "blend.0" : "blend.1",
-                                                       frame.blend.size(), frame.blend.size());
-    for (size_t i = is_first ? 0 : 2; i < blend.size(); i += kBlendNumbers) {
-      frame.blend[i] = blend[i];
-      frame.blend[i + 1] = blend[i + 1];
-    }
   }
 
   void forget() {
@@ -222,16 +195,16 @@ class RelayModel final : public FitModel {
   /// Gets what a segment begins with, where it is not at hand.
   void enter(size_t index) {
     if (entered_ == index) return;
-    const RelaySegment& segment = segments_[index];
+    const RelaySegment& segment = segments()[index];
     forget();
     switch (segment.stage) {
       case RelayStage::kGlobal:
         break;
       case RelayStage::kKeyFrame:
-        begin(keyFrameOfTensors(need(RelayStage::kGlobal, 0), "", shape()));
+        begin(parts_->keyFrame(RelayStage::kGlobal, 0));
         break;
       case RelayStage::kWindow: {
-        KeyFrame frame = keyFrameOfTensors(need(RelayStage::kKeyFrame, segment.key), "", shape());
+        KeyFrame frame = parts_->keyFrame(RelayStage::kKeyFrame, segment.key);
         frame.deformation = makeDeformation(planesOf(frame.scaffold), frame.scaffold.gaussians);
         begin(std::move(frame));
         break;
@@ -253,8 +226,7 @@ class RelayModel final : public FitModel {
 
   void loadPair(uint32_t key) {
     for (uint32_t i = 0; i < 2; ++i) {
-      pair_[i] = std::make_unique<KeyFrame>(
-          keyFrameOfTensors(need(RelayStage::kWindow, key + i), "", shape()));
+      pair_[i] = std::make_unique<KeyFrame>(parts_->keyFrame(RelayStage::kWindow, key + i));
     }
   }
 
@@ -293,7 +265,15 @@ class RelayModel final : public FitModel {
     ScaffoldState& state = work_.state;
     const ScaffoldDecoder decoder(state.scaffold);
     const bool is_window = segment.stage == RelayStage::kWindow;
-    const size_t count = state.scaffold->size();
+    size_t count = state.scaffold->size();
+    if (segment.stage != RelayStage::kKeyFrame) {
+      if (beginsBudgets(moment)) {
+        beginBudgets(state);
+        gradients_ = {};
+      }
+      count = budgetOfStep(moment, mixBits(options_.anchors.seed ^ *entered_), count,
+                           is_window ? kBudgetShare : 0.5);
+    }
     {
       const TimedBlock watch(report.seconds.field);
       if (is_window) {
@@ -302,20 +282,14 @@ class RelayModel final : public FitModel {
       }
       decoder.forward(is_window ? deformed_ : *state.scaffold, count, tape_, cloud_);
     }
-    const double done =
-        static_cast<double>(moment.iteration) / static_cast<double>(moment.iterations);
     StatisticRequest request;
     request.screen_gradients = watchesAnchors(moment);
-    request.contributions = is_window && done > kWorthFrom;
     passOverView(*pass_, cloud_, view, request, options_.anchors.ssim_share, progress, report);
-    if (request.any()) {
+    if (request.screen_gradients) {
       const TimedBlock watch(report.seconds.edit);
       ViewStatistics statistics;
       pass_->lendStatistics(statistics);
-      if (request.screen_gradients) {
-        observeAnchors(statistics, *view.camera, tape_, cloud_.opacities, state);
-      }
-      if (request.contributions) weigh(statistics);
+      observeAnchors(statistics, *view.camera, tape_, cloud_.opacities, state);
     }
     {
       const TimedBlock watch(report.seconds.field);
@@ -332,27 +306,19 @@ class RelayModel final : public FitModel {
     }
     {
       const TimedBlock watch(report.seconds.optimiser);
-      learnAnchors(moment, gradients_, state);
+      learnAnchors(moment, gradients_, state, is_window ? kWindowRates : 1.0);
       if (is_window) learnDeformation(moment, deformation_gradients_, work_);
     }
     if (!growsAnchors(moment)) return;
     const TimedBlock watch(report.seconds.edit);
     AnchorGrowthLimits limits = {voxel_, options_.anchors.most_anchors, options_.anchors.seed};
+    const double done =
+        static_cast<double>(moment.iteration) / static_cast<double>(moment.iterations);
     for (size_t level = 0; level < limits.level_weights.size(); ++level) {
       limits.level_weights[level] = kLevelWeights[level] + (1 - kLevelWeights[level]) * done;
     }
     growAnchors(moment, limits, state);
     gradients_ = {};
-  }
-
-  /// What an anchor does to the error, added up over the steps of a window's end.
-  void weigh(const ViewStatistics& statistics) {
-    work_.worth.resize(work_.state.scaffold->size(), 0.0);
-    const std::span<const float> contributions = statistics.of(Statistic::kContributions);
-    for (size_t n = 0; n < tape_.slots.size(); ++n) {
-      work_.worth[tape_.slots[n] / work_.state.scaffold->gaussians] -=
-          static_cast<double>(contributions[n]);
-    }
   }
 
   void blendStep(const RelaySegment& segment, const FitMoment& moment, const StepView& view,
@@ -402,23 +368,15 @@ class RelayModel final : public FitModel {
   /// Puts what a segment has made into the store.
   void leave(const RelaySegment& segment) {
     if (segment.stage == RelayStage::kBlend) {
-      TensorTable table;
-      putValues("blend.0", work_.blends[0], table);
-      putValues("blend.1", work_.blends[1], table);
-      store_->put(nameOf(segment.stage, segment.key), table);
+      parts_->putBlends(segment, work_.blends);
     } else {
-      if (segment.stage == RelayStage::kWindow) {
-        work_.worth.resize(work_.state.scaffold->size(), 0.0);
-        work_.state.keep(orderOfWorth(work_.worth));
-        work_.worth.clear();
-      }
       const uint64_t count = work_.state.scaffold->size();
       if (segment.stage == RelayStage::kGlobal) {
         std::fill(anchor_counts_.begin(), anchor_counts_.end(), count);
       } else {
         anchor_counts_[segment.key] = count;
       }
-      store_->put(nameOf(segment.stage, segment.key), tensorsOfKeyFrame(keyFrameOf(work_), ""));
+      parts_->put(segment, keyFrameOf(work_));
     }
     forget();
   }
@@ -426,8 +384,7 @@ class RelayModel final : public FitModel {
   RelayModelOptions options_;
   double voxel_;               ///< metres
   std::vector<double> times_;  ///< of the training views, seconds
-  std::vector<RelaySegment> segments_;
-  std::shared_ptr<KeyFrameStore> store_;
+  std::shared_ptr<RelayParts> parts_;
   RelayWork work_;
   std::vector<uint64_t> anchor_counts_;  ///< of each key frame as it is now
   uint64_t steps_ = 0;
@@ -467,10 +424,9 @@ std::unique_ptr<FitModel> makeRelayModel(const BackendFactory& backends, const V
                                       std::move(times), options, std::move(store));
 }
 
-KeyFrameSource relayResult(FitModel& model) {
-  auto* relay = dynamic_cast<RelayModel*>(&model);
-  if (relay == nullptr) return nullptr;
-  return [relay](uint32_t key) { return relay->latest(key); };
+KeyFrameSource relayResult(const FitModel& model) {
+  const auto* relay = dynamic_cast<const RelayModel*>(&model);
+  return relay ? relay->result() : nullptr;
 }
 
 }  // namespace stipple

@@ -32,7 +32,8 @@ std::unique_ptr<FitModel> makeRelayModel(const BackendFactory& backends, const V
                                          std::shared_ptr<KeyFrameStore> store,
                                          Progress* progress = nullptr);
 
-/// Key frames as such a fit has them now, the last finished stage of each; null for other models.
-KeyFrameSource relayResult(FitModel& model);
+/// Key frames as such a fit has them now, the last finished stage of each, which are read from the
+/// store whenever they are asked for; null for other models.
+KeyFrameSource relayResult(const FitModel& model);
 
 }  // namespace stipple

@@ -134,7 +134,6 @@ TensorTable tensorsOf(const RelayWork& work) {
     table[name] = std::move(tensor);
   }
   putMoments("deformation.", work.deformation_moments, table);
-  putValues("worth", work.worth, table);
   for (size_t i = 0; i < work.blends.size(); ++i) {
     putValues(numbered("blend.", i), work.blends[i], table);
   }
@@ -155,7 +154,6 @@ RelayWork workOf(const TensorTable& table, const RelayWork& like) {
     work.deformation_moments.push_back(zerosLike(values));
   });
   takeMoments("deformation.", table, work.deformation_moments);
-  work.worth = takeValues<double>(table, "worth", 0, work.state.scaffold->size());
   if (table.contains("blend.0")) {
     for (size_t i = 0; i < 2; ++i) {
       work.blends.push_back(

@@ -17,7 +17,6 @@ struct RelayWork {
   AnchorDeformation deformation;             ///< not there outside of windows
   std::vector<Moments> deformation_moments;  ///< of planes, then of weights and biases of heads
   uint64_t deformation_steps = 0;
-  std::vector<double> worth;               ///< [A] or empty: not asked yet
   std::vector<std::vector<float>> blends;  ///< of two key frames, [A,kBlendNumbers] each; or none
   std::vector<Moments> blend_moments;
   uint64_t blend_steps = 0;
@@ -38,7 +37,7 @@ void learnDeformation(const FitMoment& moment, const DeformationGradients& gradi
 void learnBlend(const FitMoment& moment, const std::array<std::vector<float>, 2>& by_blend,
                 RelayWork& work);
 
-/// As named tensors: those of its state, "deformation.*", "worth", "blend.*" and "adam.*".
+/// As named tensors: those of its state, "deformation.*", "blend.*" and "adam.*".
 TensorTable tensorsOf(const RelayWork& work);
 /// The other way round. In: like: of the same networks. Errors: kFormat.
 RelayWork workOf(const TensorTable& table, const RelayWork& like);

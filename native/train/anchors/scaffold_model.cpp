@@ -51,7 +51,10 @@ class ScaffoldModel final : public FitModel {
 
   StepReport step(const FitMoment& moment, const StepView& view, ViewEvaluator*,
                   Progress* progress) override {
-    if (beginsBudgets(moment)) beginBudgets();
+    if (beginsBudgets(moment)) {
+      beginBudgets(state_);
+      gradients_ = {};
+    }
     const bool watches = watchesAnchors(moment);
     StepReport report;
     report.stage = "Anchors";
@@ -90,7 +93,7 @@ class ScaffoldModel final : public FitModel {
     return report;
   }
 
-  /// Budgets are learned until then.
+  /// Budgets are learned until the end.
   bool isWholeAtItsEndOnly() const override { return true; }
 
   SplatCloud splats(uint64_t budget) override {
@@ -147,18 +150,6 @@ class ScaffoldModel final : public FitModel {
   }
 
  private:
-  /// Anchors in an order whose first are spread over all, by how much they are seen.
-  void beginBudgets() {
-    std::vector<double> worth;
-    for (size_t a = 0; a < state_.scaffold->size(); ++a) {
-      worth.push_back(static_cast<double>(state_.statistics.opacity_sums[a]) /
-                      std::max(1.0, static_cast<double>(state_.statistics.seen[a])));
-    }
-    state_.keep(nestedOrder(state_.scaffold->positions, worth));
-    state_.scaffold->coarsening = kCoarsening;
-    gradients_ = {};
-  }
-
   /// What the loss of the views would rise by without each of the first anchors, summed over its
   /// splats.
   std::vector<double> worthOf(FitViewEvaluator& views, size_t anchors) {

@@ -171,8 +171,8 @@ double regulariseSizes(const FitMoment& moment, const SplatCloud& cloud,
   return weight * sum;
 }
 
-void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients,
-                  ScaffoldState& state) {
+void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients, ScaffoldState& state,
+                  double share) {
   ScaffoldParameters& scaffold = *state.scaffold;
   std::vector<AdamGroup> groups;
   size_t next = 0;
@@ -181,7 +181,7 @@ void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients,
     Moments& both = state.moments[next++];
     if (values.empty()) return;
     groups.push_back({values.data(), by.data(), both.first.data(), both.second.data(),
-                      values.size(), 1, rateAt(rate, moment)});
+                      values.size(), 1, share * rateAt(rate, moment)});
   };
   add(scaffold.features, gradients.anchors.features, kFeatureRate);
   add(scaffold.log_scales, gradients.anchors.log_scales, kScaleRate);
@@ -284,13 +284,23 @@ bool beginsBudgets(const FitMoment& moment) {
   return moment.iteration == std::max<uint64_t>(1, scaleSchedule(kGrowUntil, moment.iterations));
 }
 
-uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors) {
+void beginBudgets(ScaffoldState& state) {
+  std::vector<double> worth;
+  for (size_t a = 0; a < state.scaffold->size(); ++a) {
+    worth.push_back(static_cast<double>(state.statistics.opacity_sums[a]) /
+                    std::max(1.0, static_cast<double>(state.statistics.seen[a])));
+  }
+  state.keep(nestedOrder(state.scaffold->positions, worth));
+  state.scaffold->coarsening = kCoarsening;
+}
+
+uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors, double share) {
   if (moment.iteration < std::max<uint64_t>(1, scaleSchedule(kGrowUntil, moment.iterations))) {
     return anchors;
   }
   const double dice =
       static_cast<double>(unitFloat(keyedBits(seed, RandomUse::kAnchorBudget, moment.iteration)));
-  const double octaves = kBudgetOctaves * std::max(0.0, 2.0 * dice - 1.0);
+  const double octaves = kBudgetOctaves * std::max(0.0, 1.0 - (1.0 - dice) / share);
   const double budget = static_cast<double>(anchors) * std::exp2(-octaves);
   return std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(budget)));
 }

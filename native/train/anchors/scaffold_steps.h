@@ -38,9 +38,9 @@ void observeAnchors(const ViewStatistics& statistics, const Camera& camera,
 double regulariseSizes(const FitMoment& moment, const SplatCloud& cloud,
                        SplatCloud& cloud_gradient);
 
-/// One step of Adam for anchors and networks.
-void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients,
-                  ScaffoldState& state);
+/// One step of Adam for anchors and networks. In: share, of the rates.
+void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients, ScaffoldState& state,
+                  double share = 1);
 
 struct AnchorGrowthLimits {
   double voxel = 1e-3;        ///< metres
@@ -63,8 +63,11 @@ double voxelOf(std::span<const float> places);
 
 /// When growth is over: from then on steps learn budgets below all anchors, too, in nestedOrder().
 bool beginsBudgets(const FitMoment& moment);
-/// Anchors that a step draws: all in every second step, else at most five octaves fewer.
-uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors);
+/// Puts anchors into that order, by how much they are seen; splats of fewer are larger from then
+/// on.
+void beginBudgets(ScaffoldState& state);
+/// Anchors that a step draws: fewer in this share of the steps, by at most five octaves, else all.
+uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors, double share = 0.5);
 /// Splats of half of the anchors are this power of 2 as large: those of a surface cover as much.
 constexpr double kCoarsening = 0.5;
 

@@ -52,9 +52,10 @@ void validate(const DetailModelSizes& sizes) {
                                         "; more than 0, up to 1, is allowed");
 }
 
-DetailModel::DetailModel(const DetailModelSizes& sizes)
+DetailModel::DetailModel(const DetailModelSizes& sizes, FactorPrecision precision)
     : sizes_((validate(sizes), sizes)),
       children_(sizes.layers, sizes.children),
+      layout_(precision),
       input_(layout_, "detail.input.", sizes.heads, sizes.head_width),
       network_(layout_, "detail.layers.", networkSizes(sizes)) {}
 

@@ -40,8 +40,10 @@ class DetailModel {
     std::vector<DetailNetwork::Leaves> leaves;
   };
 
-  /// Errors: kInvalidArgument (validate()).
-  explicit DetailModel(const DetailModelSizes& sizes);
+  /// In: precision, of the factors of products in blocks. Errors: kInvalidArgument (validate());
+  /// kUnavailable (requirePrecision()).
+  explicit DetailModel(const DetailModelSizes& sizes,
+                       FactorPrecision precision = FactorPrecision::kFloat32);
 
   const ParameterLayout& layout() const { return layout_; }
   const DetailModelSizes& sizes() const { return sizes_; }

@@ -56,14 +56,13 @@ std::vector<DetailView> detailViews(const ObjectViews& views, const std::vector<
 
 DetailTrainer::DetailTrainer(const DetailModelSizes& sizes, const DetailSchedule& schedule,
                              uint64_t seed, std::shared_ptr<const DetailSource> objects,
-                             std::shared_ptr<const BackendFactory> backends,
-                             std::shared_ptr<GradientExchange> exchange)
-    : model_(sizes),
+                             std::shared_ptr<const BackendFactory> backends, TrainerRun run)
+    : model_(sizes, run.precision),
       schedule_(schedule),
       seed_(seed),
       objects_(std::move(objects)),
       backends_(std::move(backends)),
-      exchange_(exchange ? std::move(exchange) : noExchange()),
+      exchange_(run.exchange ? std::move(run.exchange) : noExchange()),
       values_(model_.startValues(seed)),
       gradients_(values_.size()) {
   validate(schedule);
@@ -99,12 +98,13 @@ void DetailTrainer::addExample(size_t index, uint64_t key, double share, DetailS
   const std::vector<size_t> seen = drawnViews(views.count(), schedule_.seen, mixBits(key));
   const std::unique_ptr<ViewPass> pass = backends_->makeViewPass();
   const double view_share = share / static_cast<double>(seen.size());
+  const double scaled_share = view_share * optimiser_->lossScale();
   for (const size_t at : seen) {
     if (progress != nullptr) progress->throwIfCancelled();
     const ObjectView view = views.view(at);
     const bool is_white = keyedBits(key, RandomUse::kBackground, at) & 1;
     const ImageLossValue loss = addViewLoss(*pass, view, is_white, fine, {}, schedule_.ssim,
-                                            view_share, by_view, by_fine, progress);
+                                            scaled_share, by_view, by_fine, progress);
     done.l1 += view_share * loss.l1;
     done.ssim += view_share * loss.ssim;
     done.loss += view_share * (1 + schedule_.ssim) * loss.loss;

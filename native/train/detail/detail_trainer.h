@@ -10,7 +10,7 @@
 #include "data/tensor_table.h"
 #include "train/detail/detail_model.h"
 #include "train/networks/density_autoencoder.h"
-#include "train/networks/gradient_exchange.h"
+#include "train/networks/trainer_run.h"
 #include "train/optimiser/weight_optimiser.h"
 
 namespace stipple {
@@ -53,12 +53,11 @@ std::vector<DetailView> detailViews(const ObjectViews& views, const std::vector<
 /// training that was stopped goes on bit for bit.
 class DetailTrainer {
  public:
-  /// In: exchange, as AutoencoderTrainer has it. Errors: kInvalidArgument: validate(); a source
-  /// without objects; fewer objects in a step than there are processes.
+  /// Errors: kInvalidArgument: validate(); a source without objects; fewer objects in a step than
+  /// there are processes; kUnavailable (requirePrecision()).
   DetailTrainer(const DetailModelSizes& sizes, const DetailSchedule& schedule, uint64_t seed,
                 std::shared_ptr<const DetailSource> objects,
-                std::shared_ptr<const BackendFactory> backends,
-                std::shared_ptr<GradientExchange> exchange = nullptr);
+                std::shared_ptr<const BackendFactory> backends, TrainerRun run = {});
 
   const DetailModel& model() const { return model_; }
   const std::vector<float>& values() const { return values_; }

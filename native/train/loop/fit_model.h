@@ -70,7 +70,8 @@ class FitModel {
   /// The view of an iteration, as ViewEvaluator counts them, of a model that learns from some views
   /// at a time; empty: the trainer's own order.
   virtual std::optional<size_t> viewAt(uint64_t /*iteration*/) const { return {}; }
-  /// Whether the state after the last step is the result, whatever was measured in between.
+  /// Whether the last state is the result, whatever earlier ones measured better: what is measured
+  /// on the way shows how far the fit is, and chooses nothing.
   virtual bool isWholeAtItsEndOnly() const { return false; }
 
   /// The splats at a budget (of a field: its anchors); 0: all that there are, or the largest budget

@@ -152,7 +152,6 @@ FitMoment Trainer::momentOf(uint64_t iteration) const {
 /// Where the step before lowered opacities, splats look like fog: they are measured before it.
 bool Trainer::measureIsDue() const {
   if (iteration_ == options_.iterations) return true;
-  if (model_->isWholeAtItsEndOnly()) return false;
   const uint64_t interval = measureInterval();
   const auto lowers = [this](uint64_t at) { return model_->lowersOpacitiesAt(momentOf(at)); };
   if (iteration_ % interval == 0) return !lowers(iteration_);
@@ -242,7 +241,7 @@ void Trainer::measure() {
   double best = -std::numeric_limits<double>::infinity();
   for (const FitMeasure& earlier : history_.measures) best = std::max(best, earlier.training_psnr);
   history_.measures.push_back(measure);
-  if (measure.training_psnr < best) return;
+  if (measure.training_psnr < best && !model_->isWholeAtItsEndOnly()) return;
   history_.best_iteration = iteration_;
   best_.reset();
 }
@@ -340,7 +339,8 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
       break;
     }
     // The best is kept before it is trained any further.
-    if (!best_ && history_.best_iteration == iteration_ && iteration_ > 0) best_ = model_->state();
+    const bool is_best = history_.best_iteration == iteration_ && iteration_ > 0;
+    if (!best_ && is_best && !model_->isWholeAtItsEndOnly()) best_ = model_->state();
     try {
       step(pace);
     } catch (...) {
@@ -412,7 +412,9 @@ void Trainer::restore(const TensorTable& state) {
                                  "; the fit has " + std::to_string(options_.iterations));
   }
   std::optional<TensorTable> best = takeBest(state);
-  if (best.has_value() != (history.best_iteration != iteration && history.best_iteration > 0)) {
+  const bool has_passed_best = history.best_iteration != iteration && history.best_iteration > 0 &&
+                               !model_->isWholeAtItsEndOnly();
+  if (best.has_value() != has_passed_best) {
     fail(ErrorCode::kFormat, "the checkpoint lacks the best state of its fit");
   }
   model_->restore(modelState(state));

@@ -70,13 +70,13 @@ AutoencoderTrainer::AutoencoderTrainer(const AutoencoderSizes& sizes,
                                        std::vector<AutoencoderSchedule> parts, uint64_t seed,
                                        std::shared_ptr<const ObjectSource> objects,
                                        std::shared_ptr<const BackendFactory> backends,
-                                       std::shared_ptr<GradientExchange> exchange)
-    : networks_(sizes),
+                                       TrainerRun run)
+    : networks_(sizes, run.precision),
       parts_(std::move(parts)),
       seed_(seed),
       objects_(std::move(objects)),
       backends_(std::move(backends)),
-      exchange_(exchange ? std::move(exchange) : noExchange()),
+      exchange_(run.exchange ? std::move(run.exchange) : noExchange()),
       values_(networks_.startValues(seed)),
       gradients_(values_.size()) {
   if (parts_.empty()) refuse("a training has 0 parts; one or more are needed");
@@ -117,7 +117,8 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
                             static_cast<double>(part.most_anchors - part.least_anchors + 1));
   example.views = part.views;
   example.surface = part.surface;
-  example.share = 1 / static_cast<double>(part.batch);
+  const double share = 1 / static_cast<double>(part.batch);
+  example.share = share * optimiser_->lossScale();
   AutoencoderStep done;
   done.step = taken_;
   done.part = part_;
@@ -131,7 +132,7 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
     example.seed = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
     addLosses(
         networks_.addExample(values_, example, part.weights, *backends_, gradients_, progress),
-        example.share, done.losses);
+        share, done.losses);
   }
   LossNumbers numbers = numbersOf(done.losses);
   sumStep(*exchange_, values_, gradients_, numbers);
@@ -165,8 +166,7 @@ void AutoencoderTrainer::resume(const TensorTable& table) {
   const WeightOptimiserOptions& options =
       parts_[std::min<size_t>(counts[2], parts_.size() - 1)].optimiser;
   std::vector<float> values;
-  WeightOptimiser::State state =
-      takeWeights(table, "", values_.size(), options.clip_buffer, values);
+  WeightOptimiser::State state = takeWeights(table, "", values_.size(), options, values);
   state.steps = counts[0];
   state.skipped = counts[1];
   optimiser_.emplace(options, std::move(state));

@@ -9,7 +9,7 @@
 #include "base/progress.h"
 #include "data/tensor_table.h"
 #include "train/networks/density_autoencoder.h"
-#include "train/networks/gradient_exchange.h"
+#include "train/networks/trainer_run.h"
 #include "train/optimiser/weight_optimiser.h"
 
 namespace stipple {
@@ -54,13 +54,11 @@ struct AutoencoderStep {
 /// one takes all, so that they learn the same but for the order of sums.
 class AutoencoderTrainer {
  public:
-  /// In: exchange: with the other processes; null: there are none. Errors: kInvalidArgument:
-  /// validate(); a source without objects; a part that has fewer objects in a step than there are
-  /// processes.
+  /// Errors: kInvalidArgument: validate(); a source without objects; a part that has fewer objects
+  /// in a step than there are processes; kUnavailable (requirePrecision()).
   AutoencoderTrainer(const AutoencoderSizes& sizes, std::vector<AutoencoderSchedule> parts,
                      uint64_t seed, std::shared_ptr<const ObjectSource> objects,
-                     std::shared_ptr<const BackendFactory> backends,
-                     std::shared_ptr<GradientExchange> exchange = nullptr);
+                     std::shared_ptr<const BackendFactory> backends, TrainerRun run = {});
 
   /// Begins with other weights, before the first step. In: values, of the networks' layout.
   void start(std::vector<float> values);

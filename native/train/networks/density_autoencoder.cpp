@@ -125,8 +125,9 @@ TensorTable DensityAutoencoder::tensors(std::span<const float> values) const {
   return table;
 }
 
-DensityAutoencoder::DensityAutoencoder(const AutoencoderSizes& sizes)
+DensityAutoencoder::DensityAutoencoder(const AutoencoderSizes& sizes, FactorPrecision precision)
     : sizes_((validate(sizes), sizes)),
+      layout_(precision),
       encoder_(layout_, "encoder.", shapeOf(sizes, sizes.encoder_blocks), sizes.feature_widths),
       octree_(layout_, "octree.", shapeOf(sizes, sizes.octree_blocks)),
       splats_(layout_, "gs.", shapeOf(sizes, sizes.splat_blocks), sizes.gaussians) {}

@@ -93,7 +93,7 @@ struct AutoencoderExample {
   size_t surface =
       8192;           ///< points of the surface that tell the density, drawn where there are more
   uint64_t seed = 0;  ///< of noise, anchors, views and backgrounds
-  double share = 1;   ///< of the step: one over its examples
+  double share = 1;   ///< of the step: one over its examples, times the scale of its loss
 };
 
 /// What an example lost, without weights.
@@ -107,8 +107,10 @@ struct AutoencoderLosses {
 /// The density autoencoder as it is trained: encoder, density and splats.
 class DensityAutoencoder {
  public:
-  /// Errors: kInvalidArgument (validate()).
-  explicit DensityAutoencoder(const AutoencoderSizes& sizes);
+  /// In: precision, of the factors of products in blocks. Errors: kInvalidArgument (validate());
+  /// kUnavailable (requirePrecision()).
+  explicit DensityAutoencoder(const AutoencoderSizes& sizes,
+                              FactorPrecision precision = FactorPrecision::kFloat32);
 
   const ParameterLayout& layout() const { return layout_; }
   const AutoencoderSizes& sizes() const { return sizes_; }

@@ -97,12 +97,12 @@ struct FlowTrainer::Drawn {
 };
 
 FlowTrainer::FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, uint64_t seed,
-                         std::shared_ptr<const FlowSource> objects,
-                         std::shared_ptr<GradientExchange> exchange)
-    : schedule_(schedule),
+                         std::shared_ptr<const FlowSource> objects, TrainerRun run)
+    : layout_(run.precision),
+      schedule_(schedule),
       seed_(seed),
       objects_(std::move(objects)),
-      exchange_(exchange ? std::move(exchange) : noExchange()),
+      exchange_(run.exchange ? std::move(run.exchange) : noExchange()),
       flow_((validate(sizes), layout_), sizes),
       values_(firstValues(layout_, sizes, seed)),
       gradients_(values_.size()) {
@@ -156,6 +156,8 @@ FlowStep FlowTrainer::step(Progress* progress) {
   FlowStep done;
   done.step = taken_;
   std::fill(gradients_.begin(), gradients_.end(), 0.0f);
+  const double scale = optimiser_->lossScale();
+  const double parts = static_cast<double>(schedule_.batch) / scale;
   for (size_t b = exchange_->rank(); b < schedule_.batch; b += exchange_->size()) {
     if (progress != nullptr) progress->throwIfCancelled();
     const uint64_t key = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
@@ -164,8 +166,7 @@ FlowStep FlowTrainer::step(Progress* progress) {
     TrainedFlow::Tape tape;
     const Latent seen = flow_.forward(values_, at.example.state, at.time, at.condition, tape);
     Latent by;
-    done.loss +=
-        flowLoss(seen, at.example.velocity, at.count * static_cast<double>(schedule_.batch), by);
+    done.loss += flowLoss(seen, at.example.velocity, at.count * parts, by) / scale;
     flow_.backward(values_, at.example.state, at.condition, tape, by, gradients_);
   }
   sumStep(*exchange_, values_, gradients_, {&done.loss, 1});

@@ -8,8 +8,8 @@
 
 #include "base/progress.h"
 #include "data/tensor_table.h"
-#include "train/networks/gradient_exchange.h"
 #include "train/networks/trained_flow.h"
+#include "train/networks/trainer_run.h"
 #include "train/optimiser/weight_optimiser.h"
 
 namespace stipple {
@@ -51,11 +51,10 @@ struct FlowStep {
 /// that was stopped goes on bit for bit.
 class FlowTrainer {
  public:
-  /// In: exchange, as AutoencoderTrainer has it. Errors: kInvalidArgument: validate(); a source
-  /// without objects; fewer objects in a step than there are processes.
+  /// Errors: kInvalidArgument: validate(); a source without objects; fewer objects in a step than
+  /// there are processes; kUnavailable (requirePrecision()).
   FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, uint64_t seed,
-              std::shared_ptr<const FlowSource> objects,
-              std::shared_ptr<GradientExchange> exchange = nullptr);
+              std::shared_ptr<const FlowSource> objects, TrainerRun run = {});
 
   const std::vector<float>& values() const { return values_; }
   /// The mean of weights over steps.

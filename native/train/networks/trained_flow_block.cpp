@@ -34,6 +34,7 @@ TrainedRotary::TrainedRotary(ParameterLayout& layout, const std::string& name,
   }
   norm_weight_ = layout.add(name + ".norm.weight", {sizes.channels});
   norm_bias_ = layout.add(name + ".norm.bias", {sizes.channels});
+  // In float32 whatever blocks have: places become angles of up to 16 pi for each unit.
   gate_ = TrainedLinear(layout, name + ".gate_map", sizes.channels, sizes.rotary_width,
                         LinearBias::kNone);
   content_ = TrainedLinear(layout, name + ".content_map", sizes.channels, sizes.rotary_width,
@@ -132,10 +133,12 @@ TrainedFlowBlock::TrainedFlowBlock(ParameterLayout& layout, const std::string& b
     : sizes_(sizes),
       modulation_(modulation),
       rotary_(layout, rotary, sizes),
-      to_all_(layout, block + ".attn.qkv", sizes.channels, 3 * sizes.channels),
+      to_all_(layout, block + ".attn.qkv", sizes.channels, 3 * sizes.channels, LinearBias::kNeeded,
+              layout.precision()),
       query_gamma_(layout.add(block + ".attn.q_norm.gamma", {sizes.heads, sizes.head_width})),
       key_gamma_(layout.add(block + ".attn.k_norm.gamma", {sizes.heads, sizes.head_width})),
-      out_(layout, block + ".attn.out", sizes.channels, sizes.channels),
+      out_(layout, block + ".attn.out", sizes.channels, sizes.channels, LinearBias::kNeeded,
+           layout.precision()),
       mlp_(trainedTokenMlp(layout, block + ".mlp.mlp.", shapeOf(sizes))) {
   if (modulation == FlowModulation::kTime) {
     shift_table_ = layout.add(block + ".shift_table", {1, 6 * sizes.channels});

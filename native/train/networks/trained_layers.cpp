@@ -56,11 +56,14 @@ void TrainedPointEmbedding::backward(std::span<const float> values, size_t rows,
 TrainedCrossAttention::TrainedCrossAttention(ParameterLayout& layout, const std::string& prefix,
                                              const NetworkShape& shape)
     : shape_(shape),
-      to_queries_(layout, prefix + "to_q", shape.width(), shape.width()),
-      to_latent_(layout, prefix + "to_kv", shape.latent_width, 2 * shape.width()),
+      to_queries_(layout, prefix + "to_q", shape.width(), shape.width(), LinearBias::kNeeded,
+                  layout.precision()),
+      to_latent_(layout, prefix + "to_kv", shape.latent_width, 2 * shape.width(),
+                 LinearBias::kNeeded, layout.precision()),
       query_gamma_(layout.add(prefix + "q_rms_norm.gamma", {shape.heads, shape.head_width})),
       key_gamma_(layout.add(prefix + "k_rms_norm.gamma", {shape.heads, shape.head_width})),
-      to_out_(layout, prefix + "to_out", shape.width(), shape.width()) {}
+      to_out_(layout, prefix + "to_out", shape.width(), shape.width(), LinearBias::kNeeded,
+              layout.precision()) {}
 
 LatentRows TrainedCrossAttention::look(std::span<const float> values, size_t tokens,
                                        const float* latent) const {
@@ -129,10 +132,12 @@ void TrainedCrossAttention::backwardOfLatent(std::span<const float> values, size
 TrainedSelfAttention::TrainedSelfAttention(ParameterLayout& layout, const std::string& prefix,
                                            const NetworkShape& shape)
     : shape_(shape),
-      to_all_(layout, prefix + "to_qkv", shape.width(), 3 * shape.width()),
+      to_all_(layout, prefix + "to_qkv", shape.width(), 3 * shape.width(), LinearBias::kNeeded,
+              layout.precision()),
       query_gamma_(layout.add(prefix + "q_rms_norm.gamma", {shape.heads, shape.head_width})),
       key_gamma_(layout.add(prefix + "k_rms_norm.gamma", {shape.heads, shape.head_width})),
-      to_out_(layout, prefix + "to_out", shape.width(), shape.width()) {}
+      to_out_(layout, prefix + "to_out", shape.width(), shape.width(), LinearBias::kNeeded,
+              layout.precision()) {}
 
 void TrainedSelfAttention::apply(std::span<const float> values, size_t rows, const float* in,
                                  Tape& tape, float* out) const {
@@ -179,7 +184,8 @@ TrainedMlp trainedTokenMlp(ParameterLayout& layout, const std::string& prefix,
           prefix + "0",
           prefix + "2",
           {width, shape.mlp_ratio * width, width},
-          Activation::kGeluTanh};
+          Activation::kGeluTanh,
+          layout.precision()};
 }
 
 }  // namespace stipple

@@ -13,16 +13,23 @@ void putWeights(const std::string& prefix, const std::vector<float>& values,
   putValues(prefix + "optimiser.mean", state.mean, table);
   putValues(prefix + "optimiser.norms", state.norms, table);
   putValues(prefix + "optimiser.most_norm", std::vector<double>{state.most_norm}, table);
+  putValues(prefix + "optimiser.loss_scale", std::vector<double>{state.loss_scale_log2}, table);
 }
 
 WeightOptimiser::State takeWeights(const TensorTable& table, const std::string& prefix,
-                                   size_t count, uint64_t clip_buffer, std::vector<float>& values) {
+                                   size_t count, const WeightOptimiserOptions& options,
+                                   std::vector<float>& values) {
   WeightOptimiser::State state;
   state.first = takeValues<float>(table, prefix + "optimiser.first", count, count);
   state.second = takeValues<float>(table, prefix + "optimiser.second", count, count);
   state.mean = takeValues<double>(table, prefix + "optimiser.mean", count, count);
-  state.norms = takeValues<float>(table, prefix + "optimiser.norms", 0, clip_buffer);
+  state.norms = takeValues<float>(table, prefix + "optimiser.norms", 0, options.clip_buffer);
   state.most_norm = takeValues<double>(table, prefix + "optimiser.most_norm", 1, 1).front();
+  // Checkpoints from before there were scales have none.
+  if (options.loss_scaling == LossScaling::kDynamic) {
+    state.loss_scale_log2 =
+        takeValues<double>(table, prefix + "optimiser.loss_scale", 1, 1).front();
+  }
   values = takeValues<float>(table, prefix + "weights", count, count);
   return state;
 }
@@ -40,7 +47,7 @@ TrainerState takeTrainerState(const TensorTable& table, const std::string& prefi
                               const WeightOptimiserOptions& options) {
   const std::vector<uint64_t> counts = takeValues<uint64_t>(table, prefix + "counts", 3, 3);
   TrainerState state;
-  state.optimiser = takeWeights(table, prefix, count, options.clip_buffer, state.values);
+  state.optimiser = takeWeights(table, prefix, count, options, state.values);
   state.optimiser.steps = counts[0];
   state.optimiser.skipped = counts[1];
   state.taken = counts[2];

@@ -44,10 +44,11 @@ std::vector<T> takeValues(const TensorTable& table, const std::string& name, siz
 /// Weights and the state of their optimiser, "weights" and "optimiser." behind a prefix.
 void putWeights(const std::string& prefix, const std::vector<float>& values,
                 const WeightOptimiser::State& state, TensorTable& table);
-/// The other way round. In: count of weights; clip_buffer of the options. Out: values. Errors:
+/// The other way round. In: count of weights; options of the optimiser. Out: values. Errors:
 /// kFormat. The counts of steps are not among it.
 WeightOptimiser::State takeWeights(const TensorTable& table, const std::string& prefix,
-                                   size_t count, uint64_t clip_buffer, std::vector<float>& values);
+                                   size_t count, const WeightOptimiserOptions& options,
+                                   std::vector<float>& values);
 
 /// A trainer of one part: its weights, its optimiser, and the steps that it has taken.
 struct TrainerState {

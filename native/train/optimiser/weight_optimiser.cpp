@@ -18,6 +18,9 @@ namespace {
 constexpr size_t kGrain = 1 << 14;
 /// Added to lengths before they divide.
 constexpr double kNoLength = 1e-6;
+/// What a gradient that is not finite takes from the log2 of the scale of losses.
+constexpr double kScaleFall = 1;
+constexpr double kMostScaleStart = 100;
 
 void require(bool is_allowed, const char* name, double value, const char* allowed) {
   if (is_allowed) return;
@@ -70,6 +73,10 @@ void validate(const WeightOptimiserOptions& options) {
           "percentile of lengths of gradients", options.clip_percentile, "0 to 100");
   require(isShare(options.mean_decay), "decay of the mean of weights", options.mean_decay,
           "0 to 1");
+  require(options.loss_scale_start >= 0 && options.loss_scale_start <= kMostScaleStart,
+          "logarithm of the first scale of losses", options.loss_scale_start, "0 to 100");
+  require(isShare(options.loss_scale_growth), "growth of the scale of losses",
+          options.loss_scale_growth, "0 to 1");
 }
 
 double rateShare(const WeightOptimiserOptions& options, uint64_t step) {
@@ -90,6 +97,9 @@ WeightOptimiser::WeightOptimiser(const WeightOptimiserOptions& options,
   state_.second.assign(values.size(), 0.0f);
   state_.mean.assign(values.begin(), values.end());
   state_.most_norm = options_.most_norm;
+  if (options_.loss_scaling == LossScaling::kDynamic) {
+    state_.loss_scale_log2 = options_.loss_scale_start;
+  }
 }
 
 WeightOptimiser::WeightOptimiser(const WeightOptimiserOptions& options, State state)
@@ -98,6 +108,8 @@ WeightOptimiser::WeightOptimiser(const WeightOptimiserOptions& options, State st
   const size_t count = state_.mean.size();
   if (state_.first.size() == count && state_.second.size() == count &&
       state_.norms.size() <= options_.clip_buffer) {
+    require(state_.loss_scale_log2 >= 0, "logarithm of the scale of losses of a state",
+            state_.loss_scale_log2, "0 or more");
     return;
   }
   fail(ErrorCode::kInvalidArgument,
@@ -108,14 +120,23 @@ WeightOptimiser::WeightOptimiser(const WeightOptimiserOptions& options, State st
            " lengths at most, are allowed");
 }
 
+double WeightOptimiser::lossScale() const {
+  if (options_.loss_scaling == LossScaling::kNone) return 1;
+  return std::exp2(std::floor(state_.loss_scale_log2));
+}
+
 WeightStep WeightOptimiser::step(std::span<float> gradient, std::span<float> values) {
   WeightStep done;
+  done.loss_scale = lossScale();
+  scale(1 / done.loss_scale, gradient);
   done.gradient_norm = normOf(gradient);
   done.most_norm = state_.most_norm;
   done.learning_rate = options_.learning_rate * rateShare(options_, state_.steps);
   if (!std::isfinite(done.gradient_norm)) {
     done.is_skipped = true;
     ++state_.skipped;
+    // A loss that is not finite itself must not take the scale to where derivatives vanish.
+    state_.loss_scale_log2 = std::max(0.0, state_.loss_scale_log2 - kScaleFall);
     return done;
   }
   done.clip_scale = std::min(1.0, done.most_norm / (done.gradient_norm + kNoLength));
@@ -144,6 +165,9 @@ WeightStep WeightOptimiser::step(std::span<float> gradient, std::span<float> val
           options_.most_norm,
           percentile({state_.norms.begin(), state_.norms.end()}, options_.clip_percentile / 100));
     }
+  }
+  if (options_.loss_scaling == LossScaling::kDynamic) {
+    state_.loss_scale_log2 += options_.loss_scale_growth;
   }
   ++state_.steps;
   return done;

@@ -52,6 +52,53 @@ TEST(TrainingConfig, SaysWhichSettingOfACheckpointDiffers) {
             "'parts.0.stage' is structure, the checkpoint has joint");
 }
 
+TEST(TrainingConfig, ScalesLossesWhereThatIsSaid) {
+  const TrainingConfig usual = parsed(R"({"collection": "a", "out": "b"})");
+  EXPECT_EQ(usual.parts[0].optimiser.loss_scaling, LossScaling::kNone);
+  // What it does not depend on is not written: checkpoints of earlier versions go on.
+  EXPECT_EQ(settingsJson(usual).find("loss_scale"), std::string::npos);
+  const TrainingConfig config =
+      parsed(R"({"collection": "a", "out": "b", "flow": {"steps": 900, "loss_scale": "dynamic"},
+                 "parts": [{"loss_scale": "dynamic", "loss_scale_start": 16}, {}]})");
+  EXPECT_EQ(config.parts[0].optimiser.loss_scaling, LossScaling::kDynamic);
+  EXPECT_EQ(config.parts[0].optimiser.loss_scale_start, 16);
+  EXPECT_EQ(config.parts[0].optimiser.loss_scale_growth, 0.001);
+  EXPECT_EQ(config.parts[1].optimiser.loss_scaling, LossScaling::kNone);
+  EXPECT_EQ(config.flow.schedule.optimiser.loss_scaling, LossScaling::kDynamic);
+  const TrainingConfig read = readSettings(settingsJson(config), "settings");
+  EXPECT_EQ(settingsJson(read), settingsJson(config));
+  EXPECT_EQ(read.parts[0].optimiser.loss_scale_start, 16);
+  EXPECT_NE(firstDifference(settingsJson(config), settingsJson(usual)), "");
+  try {
+    parsed(R"({"collection": "a", "out": "b", "parts": [{"loss_scale": "static"}]})");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "config.json: 'parts.0.loss_scale' is 'static'; none or dynamic is allowed");
+  }
+}
+
+TEST(TrainingConfig, ScalesLossesWhereProductsAreInBfloat16) {
+  const TrainingConfig config =
+      parsed(R"({"collection": "a", "out": "b", "precision": "bfloat16", "flow": {"steps": 900},
+                 "parts": [{"stage": "joint"}, {"loss_scale": "none"}]})");
+  EXPECT_EQ(config.precision, FactorPrecision::kBfloat16);
+  EXPECT_EQ(config.parts[0].optimiser.loss_scaling, LossScaling::kDynamic);
+  EXPECT_EQ(config.parts[1].optimiser.loss_scaling, LossScaling::kNone) << "as it says";
+  EXPECT_EQ(config.flow.schedule.optimiser.loss_scaling, LossScaling::kDynamic);
+  const TrainingConfig read = readSettings(settingsJson(config), "settings");
+  EXPECT_EQ(read.precision, FactorPrecision::kBfloat16);
+  EXPECT_EQ(settingsJson(read), settingsJson(config));
+  const TrainingConfig usual = parsed(R"({"collection": "a", "out": "b"})");
+  EXPECT_EQ(usual.precision, FactorPrecision::kFloat32);
+  EXPECT_EQ(settingsJson(usual).find("precision"), std::string::npos);
+  const TrainingConfig detail = parsed(
+      R"({"collection": "a", "out": "b", "detail": {"steps": 500}, "precision": "bfloat16"})");
+  EXPECT_EQ(detail.detail.schedule.optimiser.loss_scaling, LossScaling::kDynamic);
+  EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "precision": "float16"})"), Error);
+  EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "precision": 16})"), Error);
+}
+
 TEST(TrainingConfig, RefusesListsThatAreNone) {
   EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "parts": {"stage": "joint"}})"), Error);
   EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "parts": [1]})"), Error);

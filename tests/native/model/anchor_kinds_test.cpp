@@ -31,9 +31,10 @@ ScaffoldParameters someAnchors(size_t count, uint64_t seed) {
   return scaffold;
 }
 
-std::shared_ptr<const KeyFrame> someFrame(size_t count, uint64_t seed) {
+std::shared_ptr<const KeyFrame> someFrame(size_t count, uint64_t seed, double coarsening = 0) {
   KeyFrame frame;
   frame.scaffold = someAnchors(count, seed);
+  frame.scaffold.coarsening = coarsening;
   HexPlaneShape shape;
   shape.texels = 4;
   shape.moments = 3;
@@ -46,9 +47,16 @@ std::shared_ptr<const KeyFrame> someFrame(size_t count, uint64_t seed) {
   return std::make_shared<const KeyFrame>(std::move(frame));
 }
 
+KeyFrameSource sourceOf(std::vector<std::shared_ptr<const KeyFrame>> frames) {
+  return [frames = std::move(frames)](uint32_t key) {
+    return key < frames.size() ? frames[key] : nullptr;
+  };
+}
+
 void expectSameSplats(const SplatCloud& one, const SplatCloud& other) {
   EXPECT_GT(one.size(), 0u);
   EXPECT_EQ(one.positions, other.positions);
+  EXPECT_EQ(one.scales, other.scales);
   EXPECT_EQ(one.opacities, other.opacities);
   EXPECT_EQ(one.sh, other.sh);
 }
@@ -81,8 +89,9 @@ TEST_F(AnchorKinds, ALongClipComesBackAtAnyTime) {
   clip.frame_count = 26;
   clip.spacing = 8;
   // Four key frames; more than are kept at hand of a file.
-  const auto model = makeRelaySplats(
-      clip, {someFrame(20, 1), someFrame(30, 2), someFrame(25, 3), someFrame(10, 4)});
+  const KeyFrameSource frames =
+      sourceOf({someFrame(20, 1), someFrame(30, 2), someFrame(25, 3, 0.5), someFrame(10, 4)});
+  const auto model = makeRelaySplats(clip, frames);
   model->save(path("a.stipple.safetensors"));
   const auto seen = loadModel(path("a.stipple.safetensors"), {});
   EXPECT_STREQ(seen->kind(), "relay");
@@ -110,15 +119,60 @@ TEST_F(AnchorKinds, ALongClipComesBackAtAnyTime) {
                    model->decode(request));
 }
 
+TEST_F(AnchorKinds, ALongClipKeepsFewKeyFramesInMemory) {
+  KeyFrameClip clip;
+  clip.frame_count = 97;
+  clip.spacing = 8;
+  // Twelve key frames, of which it is known how many anybody has at once.
+  std::vector<std::weak_ptr<const KeyFrame>> made;
+  size_t most = 0;
+  const KeyFrameSource frames = [&](uint32_t key) {
+    const auto frame = someFrame(20, key);
+    made.push_back(frame);
+    size_t held = 0;
+    for (const auto& one : made) held += one.expired() ? 0 : 1;
+    most = std::max(most, held);
+    return frame;
+  };
+  const auto model = makeRelaySplats(clip, frames);
+  model->save(path("a.stipple.safetensors"));
+  for (double time = 0; time <= 96; time += 3) {
+    ModelRequest request;
+    request.budget = 40;
+    request.time = time;
+    model->decode(request);
+  }
+  EXPECT_GT(made.size(), 24u) << "key frames are made anew";
+  // The three that are kept and the one that takes a place among them.
+  EXPECT_LE(most, 4u);
+  EXPECT_EQ(loadModel(path("a.stipple.safetensors"), {})->info().leaf_count, 240u);
+}
+
+TEST_F(AnchorKinds, SplatsOfFewerAnchorsOfAKeyFrameAreLarger) {
+  KeyFrameClip clip;
+  clip.frame_count = 8;
+  clip.spacing = 8;
+  ModelRequest request;
+  request.budget = 5;
+  const SplatCloud as_they_are =
+      makeRelaySplats(clip, sourceOf({someFrame(20, 1)}))->decode(request);
+  const SplatCloud larger =
+      makeRelaySplats(clip, sourceOf({someFrame(20, 1, 0.5)}))->decode(request);
+  ASSERT_EQ(larger.size(), as_they_are.size());
+  for (size_t i = 0; i < larger.scales.size(); ++i) {
+    EXPECT_FLOAT_EQ(larger.scales[i], 2 * as_they_are.scales[i]);  // (20 / 5)^0.5
+  }
+}
+
 TEST_F(AnchorKinds, RefuseWhatDoesNotFitTogether) {
   KeyFrameClip clip;
   clip.frame_count = 26;
   clip.spacing = 8;
   expectError(ErrorCode::kInvalidArgument, {"1 key frames", "needs 4"},
-              [&] { makeRelaySplats(clip, {someFrame(20, 1)}); });
+              [&] { makeRelaySplats(clip, sourceOf({someFrame(20, 1)})); });
   clip.spacing = 100;
   expectError(ErrorCode::kInvalidArgument, {"0 anchors"},
-              [&] { makeRelaySplats(clip, {someFrame(0, 1)}); });
+              [&] { makeRelaySplats(clip, sourceOf({someFrame(0, 1)})); });
   expectError(ErrorCode::kInvalidArgument, {"0 anchors"}, [&] {
     makeScaffoldSplats(std::make_shared<const ScaffoldParameters>(someAnchors(0, 1)));
   });

@@ -22,11 +22,15 @@ class MatrixBackends : public ScratchFolder {
   /// The names of the backends, the default one first, in a copy of this program that runs in a
   /// folder of its own with `environment`; or what it fails with.
   std::string namesIn(const std::string& environment) const {
+    return saidIn(environment, "SayTheirNames");
+  }
+  /// What a test of such a copy writes.
+  std::string saidIn(const std::string& environment, const std::string& test) const {
     fs::copy_file("/proc/self/exe", path("alone"), fs::copy_options::overwrite_existing);
     // What this program itself is told does not count.
     const std::string command =
         "STIPPLE_MATRIX_BACKEND= " + environment + " " + kAlone + "=" + path("names") + " " +
-        path("alone") + " --gtest_filter=MatrixBackends.SayTheirNames > " + path("log") + " 2>&1";
+        path("alone") + " --gtest_filter=MatrixBackends." + test + " > " + path("log") + " 2>&1";
     const int status = std::system(command.c_str());
     EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << load(path("log"));
     return load(path("names"));
@@ -69,6 +73,37 @@ TEST_F(MatrixBackends, AreChosenByTheEnvironment) {
   EXPECT_EQ(namesIn(""), "onednn highway onednn");
   EXPECT_EQ(namesIn("STIPPLE_MATRIX_BACKEND=highway"), "highway highway onednn");
   EXPECT_EQ(namesIn("STIPPLE_MATRIX_BACKEND=onednn"), "onednn highway onednn");
+}
+
+TEST_F(MatrixBackends, SayWhyTheyHaveNoBfloat16) {
+  const char* file = std::getenv(kAlone);
+  std::string said = "it has them";
+  try {
+    requirePrecision(FactorPrecision::kFloat32);
+    requirePrecision(FactorPrecision::kBfloat16);
+    EXPECT_TRUE(defaultMatrixBackend().has(FactorPrecision::kBfloat16));
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kUnavailable);
+    said = error.what();
+  }
+  if (file != nullptr) {
+    std::ofstream(file) << said;
+    return;
+  }
+  const std::string without = saidIn("", "SayWhyTheyHaveNoBfloat16");
+  EXPECT_NE(without.find("not to be had here, because oneDNN cannot be loaded: "),
+            std::string::npos)
+      << without;
+  std::string why;
+  if (onednnBackend(&why) == nullptr) GTEST_SKIP() << "libstipple_nn.so cannot be loaded: " << why;
+  fs::create_symlink(
+      fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib" / "libstipple_nn.so",
+      path("libstipple_nn.so"));
+  const std::string named = saidIn("STIPPLE_MATRIX_BACKEND=highway", "SayWhyTheyHaveNoBfloat16");
+  EXPECT_NE(named.find("because STIPPLE_MATRIX_BACKEND is \"highway\""), std::string::npos)
+      << named;
+  const std::string limited = saidIn("ONEDNN_MAX_CPU_ISA=AVX2", "SayWhyTheyHaveNoBfloat16");
+  EXPECT_NE(limited.find("AVX512_BF16; oneDNN uses avx2"), std::string::npos) << limited;
 }
 
 size_t threadCount() {

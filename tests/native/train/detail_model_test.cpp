@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "densify/raw_splats.h"
+#include "nn/matrix_backend.h"
 #include "train/detail/detail_trainer.h"
 #include "train/trained_ball.h"
 
@@ -318,7 +319,8 @@ class GreyBall final : public DetailSource {
   TrainingObject object_ = ball();
 };
 
-DetailTrainer trainerOf(uint64_t steps, std::shared_ptr<const DetailSource> source) {
+DetailTrainer trainerOf(uint64_t steps, std::shared_ptr<const DetailSource> source,
+                        LossScaling scaling = LossScaling::kNone, TrainerRun run = {}) {
   DetailSchedule schedule;
   schedule.least_splats = 60;
   schedule.most_splats = 120;
@@ -328,9 +330,10 @@ DetailTrainer trainerOf(uint64_t steps, std::shared_ptr<const DetailSource> sour
   schedule.optimiser.warm_up = 5;
   schedule.optimiser.learning_rate = 3e-3;
   schedule.optimiser.mean_decay = 0.9;
+  schedule.optimiser.loss_scaling = scaling;
   DetailModelSizes sizes = smallSizes(1, 4);
   sizes.head_width = 8;
-  return {sizes, schedule, 3, std::move(source), cpuBackends()};
+  return {sizes, schedule, 3, std::move(source), cpuBackends(), std::move(run)};
 }
 
 TEST(DetailTrainer, LearnsToColourByTheViews) {
@@ -358,6 +361,37 @@ TEST(DetailTrainer, GoesOnBitForBit) {
   TensorTable broken = first.state();
   broken.erase("detail.weights");
   EXPECT_THROW(second.resume(broken), Error);
+}
+
+TEST(DetailTrainer, InBfloat16LearnsAboutAsMuch) {
+  const TrainerRun narrow = {nullptr, FactorPrecision::kBfloat16};
+  if (!defaultMatrixBackend().has(narrow.precision)) GTEST_SKIP() << "no products in bfloat16 here";
+  const auto source = std::make_shared<GreyBall>();
+  double last[2] = {0, 0};
+  std::vector<float> values[2];
+  for (const bool is_narrow : {false, true}) {
+    DetailTrainer trainer =
+        trainerOf(150, source, LossScaling::kDynamic, is_narrow ? narrow : TrainerRun{});
+    for (int i = 0; !trainer.isDone(); ++i) {
+      const double l1 = trainer.step().l1;
+      if (i >= 130) last[is_narrow] += l1 / 20;
+    }
+    values[is_narrow] = trainer.values();
+  }
+  EXPECT_NE(values[0], values[1]);
+  // Rounding of 2^-9 is noise; of the autoencoder's losses it moved up to 1.3 %, of four seeds.
+  EXPECT_NEAR(last[1], last[0], 0.05 * last[0]);
+}
+
+TEST(DetailTrainer, AScaleOfLossesChangesNoBit) {
+  const auto source = std::make_shared<GreyBall>();
+  DetailTrainer plain = trainerOf(8, source), scaled = trainerOf(8, source, LossScaling::kDynamic);
+  while (!plain.isDone()) {
+    const DetailStep one = plain.step(), other = scaled.step();
+    EXPECT_EQ(one.l1, other.l1);
+    EXPECT_EQ(other.weights.loss_scale, std::exp2(20));
+  }
+  EXPECT_EQ(scaled.values(), plain.values());
 }
 
 }  // namespace

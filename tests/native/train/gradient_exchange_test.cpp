@@ -86,7 +86,8 @@ std::vector<AutoencoderSchedule> partsOf(size_t batch) {
 
 AutoencoderTrainer trainerOf(std::shared_ptr<const ObjectSource> objects, size_t batch,
                              std::shared_ptr<GradientExchange> exchange = nullptr) {
-  return {smallSizes(), partsOf(batch), 7, std::move(objects), cpuBackends(), std::move(exchange)};
+  return {smallSizes(),       partsOf(batch), 7,
+          std::move(objects), cpuBackends(),  {std::move(exchange)}};
 }
 
 double farthest(const std::vector<float>& a, const std::vector<float>& b) {
@@ -131,7 +132,7 @@ TEST(GradientExchange, AGradientThatIsNotFiniteIsSkippedByAll) {
   together(2, [&](const std::shared_ptr<GradientExchange>& exchange) {
     // Densities that are not finite are drawn from in no other stage.
     AutoencoderTrainer trainer(smallSizes(), {partsOf(2).front()}, 7, objects, cpuBackends(),
-                               exchange);
+                               TrainerRun{exchange});
     while (!trainer.isDone()) {
       skipped[exchange->rank()].push_back(trainer.step().weights.is_skipped);
     }

@@ -103,6 +103,9 @@ TEST(ScaffoldModel, LearnsABallFromAFewAnchorsAndGrows) {
   const double after = psnrOf(fit.model->splats(0), *fit.views);
   EXPECT_GT(after, before + 5);
   EXPECT_GT(after, 26);
+  // It is measured on the way, which chooses nothing: the last state is the result.
+  EXPECT_GT(history.measures.size(), 3u);
+  EXPECT_EQ(history.best_iteration, 600u);
   // Six octaves, and a larger budget is not worse.
   ASSERT_EQ(history.by_budget.size(), 6u);
   for (size_t i = 1; i < history.by_budget.size(); ++i) {

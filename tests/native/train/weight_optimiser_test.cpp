@@ -84,6 +84,82 @@ TEST(WeightOptimiser, CutsWhatIsLongerThanUsual) {
   EXPECT_NEAR(gradient[0], 0.01f, 1e-6f);
 }
 
+WeightOptimiserOptions scaled() {
+  WeightOptimiserOptions options = quick();
+  options.loss_scaling = LossScaling::kDynamic;
+  options.loss_scale_start = 4.5;
+  options.loss_scale_growth = 0.25;
+  return options;
+}
+
+/// As networks find it where their loss is multiplied.
+std::vector<float> bowl(const std::vector<float>& at, double loss_scale) {
+  std::vector<float> gradient = bowl(at);
+  for (float& value : gradient) value *= static_cast<float>(loss_scale);
+  return gradient;
+}
+
+TEST(WeightOptimiser, AScaleOfLossesIsAPowerOfTwoAndChangesNoBit) {
+  std::vector<float> plain = {4, 4}, values = plain, gradient;
+  WeightOptimiser alone(quick(), plain), optimiser(scaled(), values);
+  std::vector<double> scales;
+  for (int step = 0; step < 30; ++step) {
+    alone.step(gradient = bowl(plain), plain);
+    scales.push_back(optimiser.lossScale());
+    const WeightStep done = optimiser.step(gradient = bowl(values, scales.back()), values);
+    EXPECT_EQ(done.loss_scale, scales.back());
+  }
+  EXPECT_EQ(alone.lossScale(), 1);
+  EXPECT_EQ(values, plain);
+  EXPECT_EQ(optimiser.state().mean, alone.state().mean);
+  EXPECT_EQ(optimiser.state().norms, alone.state().norms);
+  // 4.5 and a quarter for each step before; the power of two below it.
+  EXPECT_EQ(scales[0], 16);
+  EXPECT_EQ(scales[1], 16);
+  EXPECT_EQ(scales[2], 32);
+  EXPECT_EQ(scales[6], 64);
+  EXPECT_EQ(optimiser.state().loss_scale_log2, 4.5 + 30 * 0.25);
+}
+
+TEST(WeightOptimiser, AScaleOfLossesFallsWhereDerivativesOverflow) {
+  std::vector<float> values = {4, 4}, gradient;
+  WeightOptimiser optimiser(scaled(), values);
+  optimiser.step(gradient = bowl(values, 16), values);
+  const std::vector<float> before = values;
+  gradient = {1.0f, std::numeric_limits<float>::infinity()};
+  EXPECT_TRUE(optimiser.step(gradient, values).is_skipped);
+  EXPECT_EQ(values, before);
+  EXPECT_EQ(optimiser.state().loss_scale_log2, 3.75);
+  EXPECT_EQ(optimiser.lossScale(), 8);
+  EXPECT_EQ(optimiser.state().skipped, 1u);
+  EXPECT_EQ(optimiser.state().steps, 1u);
+  for (int step = 0; step < 9; ++step) {
+    gradient = {1.0f, std::numeric_limits<float>::quiet_NaN()};
+    EXPECT_TRUE(optimiser.step(gradient, values).is_skipped);
+  }
+  EXPECT_EQ(optimiser.lossScale(), 1) << "and no further";
+  EXPECT_FALSE(optimiser.step(gradient = bowl(values), values).is_skipped);
+}
+
+TEST(WeightOptimiser, GoesOnWithTheScaleOfLossesThatItHad) {
+  std::vector<float> whole = {4, 4}, parts = whole, gradient;
+  const auto run = [&](WeightOptimiser& optimiser, int first, int last, std::vector<float>& at) {
+    for (int step = first; step < last; ++step) {
+      gradient = bowl(at, optimiser.lossScale());
+      if (step % 7 == 3) gradient[0] = std::numeric_limits<float>::infinity();
+      optimiser.step(gradient, at);
+    }
+  };
+  WeightOptimiser through(scaled(), whole), first(scaled(), parts);
+  run(through, 0, 40, whole);
+  run(first, 0, 17, parts);
+  WeightOptimiser second(scaled(), first.state());
+  run(second, 17, 40, parts);
+  EXPECT_EQ(whole, parts);
+  EXPECT_EQ(through.state().loss_scale_log2, second.state().loss_scale_log2);
+  EXPECT_EQ(through.state().skipped, second.state().skipped);
+}
+
 TEST(WeightOptimiser, RefusesWhatIsOutOfRange) {
   const std::vector<float> values = {1};
   const auto refuses = [&](auto&& change) {
@@ -101,6 +177,9 @@ TEST(WeightOptimiser, RefusesWhatIsOutOfRange) {
   refuses([](auto& o) { o.most_norm = 0; });
   refuses([](auto& o) { o.clip_percentile = 101; });
   refuses([](auto& o) { o.mean_decay = 2; });
+  refuses([](auto& o) { o.loss_scale_start = -1; });
+  refuses([](auto& o) { o.loss_scale_start = 101; });
+  refuses([](auto& o) { o.loss_scale_growth = std::nan(""); });
   WeightOptimiser::State state;
   state.mean = {1.0};
   EXPECT_THROW(WeightOptimiser(quick(), state), Error);

@@ -207,7 +207,8 @@ class FitTask(view_task.ViewTask):
         is_whole = state.figures.iteration == state.figures.iterations
         yield 'keep', 0.0, 'Keeping the result'
         if is_model:
-            self._keep(made, sources.first_settings(made.settings()), report, seen)  # seed 0: the fit's own draws
+            self._keep(made, sources.first_settings(made.settings()), report, seen,  # seed 0: the fit's own draws
+                       settings.model == 'RELAY')
             self._forget(checkpoint if is_whole else None)
             return
         made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
@@ -227,9 +228,11 @@ class FitTask(view_task.ViewTask):
             with suppress(OSError):  # what else lies there stays
                 frames_folder.rmdir()
 
-    def _keep(self, model, decoding, report, seen=None):
+    def _keep(self, model, decoding, report, seen=None, is_of_key_frames=False):
         """seen: of the splats at these settings."""
         path = sources.save_model(model, self._path or source_paths.place_for(state.name), bool(self._path))
+        if is_of_key_frames:  # which it reads from what _forget() removes
+            model = Model.load(self._native, path)
         sources.remember_model(path, model)
         self.result = Result(state.name, model.decode(decoding).read(), path, decoding, model.settings(), report,
                              self._clip_start, self._key_frames)
