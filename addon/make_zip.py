@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the add-on's zip: one top folder, so that it installs as a legacy add-on and as an extension.
 
-    make_zip.py [--libraries build/release/lib] [--output build/stipple.zip] [--licences FOLDER] [--self-contained]
+    make_zip.py [--libraries build/release/lib] [--output build/stipple.zip] [--licences FOLDER]
+                [--self-contained [--platform linux-x64]]
 
 The zip runs on machines like this one. One for every machine is made by native/package/make_release.sh.
 """
@@ -19,8 +20,8 @@ PROJECT = Path(__file__).resolve().parent.parent
 PACKAGE = PROJECT / 'addon' / 'stipple'
 PLATFORM = 'linux-x64'
 LIBRARIES = ('libstipple.so', 'libstipple_media.so')
-# Where the first holds what the second does.
-SELF_CONTAINED_LIBRARIES = ('libstipple.so',)
+# Of each platform that a release is made for: the one library, which holds what the second above does.
+SELF_CONTAINED_LIBRARIES = {'linux-x64': ('libstipple.so',), 'windows-x64': ('stipple.dll',)}
 # Where oneDNN was there when the library was built; without it networks run on Stipple's own kernels.
 OPTIONAL_LIBRARIES = ('libstipple_nn.so',)
 # A fixed time, so that equal content gives an equal zip.
@@ -86,11 +87,13 @@ def main():
     parser.add_argument('--libraries', type=Path, default=PROJECT / 'build' / 'release' / 'lib')
     parser.add_argument('--output', type=Path, default=PROJECT / 'build' / 'stipple.zip')
     parser.add_argument('--licences', type=Path, help='a folder of licences that go into the zip')
-    parser.add_argument('--self-contained', action='store_true', help='libstipple.so holds the media library')
+    parser.add_argument('--self-contained', action='store_true', help='the one library holds the media library')
+    parser.add_argument('--platform', choices=SELF_CONTAINED_LIBRARIES, default=PLATFORM,
+                        help='what self-contained libraries are for')
     arguments = parser.parse_args()
     try:
-        names = SELF_CONTAINED_LIBRARIES if arguments.self_contained else LIBRARIES
-        files = make(arguments.libraries, arguments.output, names, arguments.licences)
+        names = SELF_CONTAINED_LIBRARIES[arguments.platform] if arguments.self_contained else LIBRARIES
+        files = make(arguments.libraries, arguments.output, names, arguments.licences, arguments.platform)
     except OSError as error:
         print(error, file=sys.stderr)
         return 1

@@ -3,6 +3,7 @@
 # of them; the names are the same in Debian 12, Debian 13 and sid. Does nothing when all are there.
 #   bash native/install_dependencies.sh            what building, running and testing takes
 #   bash native/install_dependencies.sh --package  also what making the add-on's zip takes (native/package)
+#   bash native/install_dependencies.sh --windows  the same, and what making and testing the zip for Windows takes
 set -euo pipefail
 
 packages=(
@@ -29,10 +30,13 @@ packages=(
 )
 # Making zips: the compiler that they are made with, and what unpacks sources.
 package_packages=(g++-12 dpkg-dev patch xz-utils ca-certificates nasm)
+# The compiler for Windows, and what runs its programs here.
+windows_packages=(g++-mingw-w64-x86-64-posix wine wine64)
 case ${1:-} in
   '') ;;
   --package) packages+=("${package_packages[@]}") ;;
-  *) echo "Dependencies: the option is '$1'; it must be --package." >&2; exit 1 ;;
+  --windows) packages+=("${package_packages[@]}" "${windows_packages[@]}") ;;
+  *) echo "Dependencies: the option is '$1'; it must be --package or --windows." >&2; exit 1 ;;
 esac
 
 missing=()

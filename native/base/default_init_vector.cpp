@@ -1,24 +1,20 @@
 #include "base/default_init_vector.h"
 
-#include <sys/mman.h>
-
-#include <cstdlib>
+#include "base/platform/memory.h"
 
 namespace stipple {
 namespace {
 
 // Below four huge pages the rounding would cost more memory than the faults cost time.
-constexpr size_t kHugePageBytes = size_t{2} << 20;
-constexpr size_t kHugeFromBytes = 4 * kHugePageBytes;
+constexpr size_t kHugeFromBytes = 4 * platform::kHugePageBytes;
 
 }  // namespace
 
 void* allocateArray(size_t bytes) {
   if (bytes < kHugeFromBytes) return ::operator new(bytes);
-  const size_t rounded = (bytes + kHugePageBytes - 1) / kHugePageBytes * kHugePageBytes;
-  void* memory = std::aligned_alloc(kHugePageBytes, rounded);
+  constexpr size_t kPage = platform::kHugePageBytes;
+  void* memory = platform::allocateOnHugePages((bytes + kPage - 1) / kPage * kPage);
   if (memory == nullptr) throw std::bad_alloc();
-  madvise(memory, rounded, MADV_HUGEPAGE);  // advice only: refused where there are no huge pages
   return memory;
 }
 
@@ -26,7 +22,7 @@ void freeArray(void* memory, size_t bytes) noexcept {
   if (bytes < kHugeFromBytes) {
     ::operator delete(memory);
   } else {
-    std::free(memory);
+    platform::freeHugePages(memory);
   }
 }
 

@@ -1,28 +1,15 @@
 #include "base/memory_limit.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/platform/memory.h"
 
 namespace stipple {
 
-namespace {
-
-/// Bytes of main memory; where the system does not tell, as many as can be named.
-uint64_t machineMemory() {
-  const long pages = sysconf(_SC_PHYS_PAGES);
-  const long page_bytes = sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || page_bytes <= 0) return UINT64_MAX;
-  return static_cast<uint64_t>(pages) * static_cast<uint64_t>(page_bytes);
-}
-
-}  // namespace
-
 uint64_t MemoryLimit::ofThisMachine() {
   constexpr uint64_t kPercent = 60;
-  const uint64_t machine = machineMemory();
+  const uint64_t machine = platform::machineMemory();
   return machine == UINT64_MAX ? machine : machine / 100 * kPercent;
 }
 
@@ -35,11 +22,11 @@ void MemoryLimit::requireBudget(uint64_t budget, const char* unit,
     const uint64_t middle = fits + (above - fits) / 2;
     (bytes_of(middle) <= memory_limit_bytes ? fits : above) = middle;
   }
-  fail(ErrorCode::kMemoryLimit,
-       "this budget of " + std::to_string(budget) + " " + unit + " would need up to " +
-           std::to_string(bytes) + " bytes; the memory limit is " +
-           std::to_string(memory_limit_bytes) + ", and at most " + std::to_string(fits) + " " +
-           unit + " fit");
+  fail(ErrorCode::kMemoryLimit, "this budget of " + std::to_string(budget) + " " + unit +
+                                    " would need up to " + std::to_string(bytes) +
+                                    " bytes; the memory limit is " +
+                                    std::to_string(memory_limit_bytes) + ", and at most " +
+                                    std::to_string(fits) + " " + unit + " fit");
 }
 
 void MemoryLimit::requireMemory(uint64_t bytes, const char* what) const {
@@ -52,7 +39,7 @@ void MemoryLimit::requireMemory(uint64_t bytes, const char* what) const {
 
 void MemoryLimit::requirePictureMemory(uint64_t bytes, const std::string& what,
                                        uint64_t pair_bytes) const {
-  const uint64_t machine = machineMemory();
+  const uint64_t machine = platform::machineMemory();
   if (bytes <= std::min(machine, memory_limit_bytes)) return;
   const std::string allowed = memory_limit_bytes <= machine
                                   ? "the memory limit is " + std::to_string(memory_limit_bytes)

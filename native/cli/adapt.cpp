@@ -1,5 +1,6 @@
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
@@ -103,7 +104,7 @@ struct Target {
 
 /// True for a PLY file whose vertices have no sizes: points of a scan, or vertices of a mesh.
 bool isPlyOfPoints(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file(std::filesystem::path(path), std::ios::binary);
   std::string line;
   if (!std::getline(file, line) || !line.starts_with("ply")) return false;
   constexpr size_t kMostLines = 4096;

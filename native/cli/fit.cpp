@@ -1,13 +1,8 @@
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -20,6 +15,7 @@
 #include "cli/hierarchy.h"
 #include "cli/jobs/status_line.h"
 #include "cli/numbers.h"
+#include "cli/platform/system.h"
 #include "cli/report.h"
 
 namespace stipple::cli {
@@ -157,18 +153,9 @@ void requireFolder(const std::string& path) {
   if (!std::filesystem::is_directory(folder)) {
     throw Failure("'" + path + "' cannot be written: there is no folder '" + folder + "'");
   }
-  if (access(folder.c_str(), W_OK) != 0) {
+  if (!isWritable(folder)) {
     throw Failure("'" + path + "' cannot be written: the folder '" + folder + "' is read-only");
   }
-}
-
-/// A new folder among temporary files that nobody else can write to, since others may guess a name.
-std::filesystem::path newTemporaryFolder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "stipple-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) {
-    throw Failure("'" + pattern + "' cannot be made: " + std::strerror(errno));
-  }
-  return pattern;
 }
 
 /// A result that cannot be written where it was wanted (a full disk) goes where temporary files go.
@@ -251,7 +238,7 @@ void fit(const Context& context, const Arguments& arguments) {
   // From here on there is something to keep, also where a terminal or the other end of a pipe is
   // gone.
   const SignalHold hold;
-  std::signal(SIGPIPE, SIG_IGN);
+  ignoreClosedPipes();
   const auto job =
       make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
                 const_cast<const StippleFitOptions*>(&options));

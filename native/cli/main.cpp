@@ -1,8 +1,10 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include "cli/commands.h"
+#include "cli/platform/system.h"
 
 namespace {
 
@@ -74,7 +76,10 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   listenForSignals();
   try {
-    return run(argc, argv);
+    std::vector<std::string> words = wordsOf(argc, argv);
+    std::vector<char*> pointers;
+    for (std::string& word : words) pointers.push_back(word.data());
+    return run(static_cast<int>(pointers.size()), pointers.data());
   } catch (const Interrupted& interrupted) {
     std::fprintf(stderr, "stipple: %s\n", interrupted.what());
     return kSignalExit + interrupted.signal;

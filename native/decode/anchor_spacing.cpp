@@ -20,8 +20,8 @@ std::vector<uint32_t> sharers(const AnchorSet& anchors) {
   for (size_t begin = 0; begin < anchors.size();) {
     size_t end = begin;
     while (end < anchors.size() && anchors.leaves[end] == anchors.leaves[begin]) ++end;
-    std::fill(counts.begin() + static_cast<long>(begin), counts.begin() + static_cast<long>(end),
-              static_cast<uint32_t>(end - begin));
+    std::fill(counts.begin() + static_cast<ptrdiff_t>(begin),
+              counts.begin() + static_cast<ptrdiff_t>(end), static_cast<uint32_t>(end - begin));
     begin = end;
   }
   return counts;

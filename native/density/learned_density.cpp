@@ -76,8 +76,9 @@ class RowCursor {
   size_t find(uint64_t cell) {
     size_t step = 1;
     while (at_ + step < cells_.size() && cells_[at_ + step] <= cell) step *= 2;
-    const auto begin = cells_.begin() + static_cast<long>(at_ + step / 2);
-    const auto end = cells_.begin() + static_cast<long>(std::min(cells_.size(), at_ + step + 1));
+    const auto begin = cells_.begin() + static_cast<ptrdiff_t>(at_ + step / 2);
+    const auto end =
+        cells_.begin() + static_cast<ptrdiff_t>(std::min(cells_.size(), at_ + step + 1));
     at_ = static_cast<size_t>(std::lower_bound(begin, end, cell) - cells_.begin());
     const bool found = at_ < cells_.size() && cells_[at_] == cell;
     const size_t row = found ? at_ : cells_.size();
@@ -452,7 +453,8 @@ double LearnedDensity::activeShareBelow() const {
     total = 0;
     for (size_t i = 0; i < children.size(); ++i) {
       const size_t row = parents.find(children[i] >> 3);
-      below[i] = shares[row] * std::exp(static_cast<double>(settled_[l][row * 8 + (children[i] & 7)]));
+      below[i] =
+          shares[row] * std::exp(static_cast<double>(settled_[l][row * 8 + (children[i] & 7)]));
       total += below[i];
     }
     shares = std::move(below);

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/own_library.h"
+#include "base/platform/loading.h"
 
 namespace stipple {
 
@@ -19,11 +20,11 @@ const StippleMediaTable* openLibrary() {
   return stipple_media_table(kMediaTableVersion);
 }
 #else
-constexpr char kFileName[] = "libstipple_media.so";
+constexpr char kName[] = "stipple_media";
 constexpr char kTableFunction[] = "stipple_media_table";
 
 [[noreturn]] void failUnavailable(const std::string& why) {
-  fail(ErrorCode::kUnavailable, std::string(kFileName) +
+  fail(ErrorCode::kUnavailable, platform::libraryFile(kName) +
                                     ", which reads and writes images, meshes, volumes and packed "
                                     "splats, cannot be loaded: " +
                                     why);
@@ -31,7 +32,7 @@ constexpr char kTableFunction[] = "stipple_media_table";
 
 const StippleMediaTable* openLibrary() {
   std::string path, why;
-  void* library = openOwnLibrary(kFileName, path, why);
+  void* library = openOwnLibrary(kName, path, why);
   if (library == nullptr) failUnavailable(why);
   const auto function =
       reinterpret_cast<StippleMediaTableFunction>(findInLibrary(library, kTableFunction));

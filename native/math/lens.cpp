@@ -3,6 +3,7 @@
 #include "math/lens.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace stipple {
 
@@ -86,7 +87,7 @@ Vec2d distort(const Lens& lens, const Vec2d& point) {
 double validRadius(const Lens& lens, double limit) {
   double valid = limit;
   for (int direction = 0; direction < kDirections; ++direction) {
-    const double angle = 2 * M_PI * direction / kDirections;
+    const double angle = 2 * std::numbers::pi * direction / kDirections;
     const Vec2d along(std::cos(angle), std::sin(angle));
     for (int step = 1; step <= kRadii; ++step) {
       const double radius = limit * step / kRadii;

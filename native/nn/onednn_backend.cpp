@@ -14,7 +14,7 @@ namespace stipple {
 
 namespace {
 
-constexpr char kFileName[] = "libstipple_nn.so";
+constexpr char kName[] = "stipple_nn";
 constexpr char kTableFunction[] = "stipple_nn_table";
 
 void throwIfFailed(const StippleNnStatus& status) {
@@ -149,7 +149,7 @@ struct Loaded {
 Loaded load() {
   Loaded loaded;
   std::string path;
-  void* library = openOwnLibrary(kFileName, path, loaded.why);
+  void* library = openOwnLibrary(kName, path, loaded.why);
   if (library == nullptr) return loaded;
   const auto function =
       reinterpret_cast<StippleNnTableFunction>(findInLibrary(library, kTableFunction));

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Gathers the licences of all that lies inside the packages' libraries.
 
-    licences.py PARTS OUTPUT
+    licences.py PARTS OUTPUT [--platform linux-x64]
 
-PARTS is the folder that make_parts.sh made. OUTPUT gets one file for each library of others, as Debian gives it, the
+PARTS is the folder that fetch.py filled. OUTPUT gets one file for each library of others, as Debian gives it, the
 texts that those refer to, and an index. A licence that cannot be found is an error.
 """
 
@@ -44,6 +44,12 @@ FROM_PACKAGES = {
     'stb': ('libstb-dev', 'stb: outlines of letters'),
     'gcc': ('libstdc++-12-dev', "GCC's libstdc++ and libgcc, under the GCC Runtime Library Exception"),
 }
+# What the package for Windows holds of both, without what reads and writes images, meshes, volumes and packed splats.
+IN_WINDOWS = ('tbb', 'hwy', 'eigen', 'nanoflann', 'nlohmann-json', 'stb', 'gcc')
+# On Windows also what stands between the compiler and the system.
+FOR_WINDOWS = {
+    'mingw-w64': ('mingw-w64-x86-64-dev', 'mingw-w64: the start of programs, functions of C99, threads of POSIX'),
+}
 COMMON_TEXTS = ('Apache-2.0', 'LGPL-2.1', 'MPL-2.0', 'GPL-3')
 
 
@@ -59,19 +65,23 @@ def licence_of_source(folder):
     raise FileNotFoundError(f"The source '{folder}' has no file of its licence")
 
 
-def gather(parts, output):
+def gather(parts, output, platform):
     """Writes the folder and returns {file: what it is about}."""
     shutil.rmtree(output, ignore_errors=True)
     output.mkdir(parents=True)
     index = {}
-    for folder, about in COMPILED.values():
+    is_windows = platform.startswith('windows')
+    compiled, packages = ({name: what for name, what in table.items() if not is_windows or name in IN_WINDOWS}
+                          for table in (COMPILED, FROM_PACKAGES))
+    for folder, about in compiled.values():
         shutil.copyfile(licence_of_source(parts / 'source' / folder), output / f'{folder}.txt')
         index[f'{folder}.txt'] = about
-    for name, (package, about) in FROM_PACKAGES.items():
+    for name, (package, about) in (packages | (FOR_WINDOWS if is_windows else {})).items():
         shutil.copyfile(DOCS / package / 'copyright', output / f'{name}.txt')
         index[f'{name}.txt'] = about
-    shutil.copyfile(parts / 'debs/libc6-dev/usr/share/doc/libc6-dev/copyright', output / 'glibc.txt')
-    index['glibc.txt'] = 'the few functions of the GNU C library that every program holds'
+    if not is_windows:
+        shutil.copyfile(parts / 'debs/libc6-dev/usr/share/doc/libc6-dev/copyright', output / 'glibc.txt')
+        index['glibc.txt'] = 'the few functions of the GNU C library that every program holds'
     font = (HERE.parent / 'plot/font/sans_regular.cpp').read_text(encoding='utf-8')
     comment = [line.removeprefix('//').removeprefix(' ') for line in font.splitlines() if line.startswith('//')]
     (output / 'dejavu-sans.txt').write_text('\n'.join(comment) + '\n', encoding='utf-8')
@@ -90,9 +100,10 @@ def main():
     parser = argparse.ArgumentParser(description='Gather the licences of what the packages hold.')
     parser.add_argument('parts', type=Path)
     parser.add_argument('output', type=Path)
+    parser.add_argument('--platform', default='linux-x64')
     arguments = parser.parse_args()
     try:
-        gather(arguments.parts, arguments.output)
+        gather(arguments.parts, arguments.output, arguments.platform)
     except OSError as error:
         print(f'licences.py: {error}', file=sys.stderr)
         return 1

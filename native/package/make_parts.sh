@@ -1,20 +1,36 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Makes what packages are linked with, in build/package: sources from a Debian mirror, static libraries of them, and
-# stubs of glibc 2.28. What is made stays for the next run.
+# Makes what packages are linked with: sources from a Debian mirror, static libraries of them, and for Linux stubs of
+# glibc 2.28. What is made stays for the next run.
+#   bash native/package/make_parts.sh             for Linux, in build/package
+#   bash native/package/make_parts.sh --windows   for Windows by mingw-w64, in build/package/windows
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-parts=$PWD/build/package
+folder=$PWD/build/package
 jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
 python=/usr/bin/python3
+parts=$folder
+cross=()
+targets=()
+if [ "${1:-}" = --windows ]; then
+  parts=$folder/windows
+  cross=(-DCMAKE_TOOLCHAIN_FILE="$PWD/native/package/windows.cmake")
+  # What reads and writes images, meshes, volumes and packed splats is not in that package yet (docs/packages.md).
+  targets=(--target part_tbb part_hwy)
+fi
 
 # The mirror that this machine's packages come from.
 mirror=$(sed -n 's/^URIs: *//p' /etc/apt/sources.list.d/debian.sources 2>/dev/null | head -1)
-$python native/package/fetch.py "$parts" --mirror "${mirror:-http://deb.debian.org/debian}"
-$python native/package/glibc_stubs.py "$parts"
-cmake -S native/package/parts -B "$parts/parts" -G Ninja -DCMAKE_BUILD_TYPE=Release \
-  -DSTIPPLE_SOURCES="$parts/source" >/dev/null
-cmake --build "$parts/parts" --parallel "$jobs"
+$python native/package/fetch.py "$folder" --mirror "${mirror:-http://deb.debian.org/debian}"
+if [ ${#cross[@]} -eq 0 ]; then
+  $python native/package/glibc_stubs.py "$parts"
+fi
+cmake -S native/package/parts -B "$parts/parts" -G Ninja -DCMAKE_BUILD_TYPE=Release "${cross[@]}" \
+  -DSTIPPLE_SOURCES="$folder/source" -DSTIPPLE_PARTS="$parts" >/dev/null
+cmake --build "$parts/parts" --parallel "$jobs" "${targets[@]}"
+if [ ${#cross[@]} -ne 0 ]; then
+  exit 0
+fi
 
 # own_build NAME OPTION...: libraries that only their own build can make.
 own_build() {

@@ -1,34 +1,51 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Makes the zip of the add-on that runs on every Linux of x86-64 with glibc 2.28 or newer:
-# build/stipple-VERSION-linux_x64.zip.
-#   bash native/package/make_release.sh             makes it and looks at it
-#   bash native/package/make_release.sh --twice     makes it again from a copy of the sources in another folder, without
-#                                                   a compiler's cache, and compares the bytes
+# Makes the zip of the add-on that runs on every machine of a system, build/stipple-VERSION-PLATFORM.zip: linux_x64, for
+# every Linux of x86-64 with glibc 2.28 or newer, or windows_x64.
+#   bash native/package/make_release.sh             makes the one for Linux and looks at it
+#   bash native/package/make_release.sh --windows   makes the one for Windows, and runs it by Wine where that is
+#   bash native/package/make_release.sh --twice     after either: makes it again from a copy of the sources in another
+#                                                   folder, without a compiler's cache, and compares the bytes
 # Takes Debian 12. STIPPLE_JOBS: compilers at a time.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 python=/usr/bin/python3
-parts=$PWD/build/package
+folder=$PWD/build/package
+parts=$folder preset=portable libraries=lib platform=linux-x64 dependencies=--package
+parts_option=() targets=(all) twice=
+for option; do
+  case $option in
+    --windows)
+      parts=$folder/windows preset=windows libraries=bin platform=windows-x64 dependencies=--windows
+      parts_option=(--windows) targets=(stipple)
+      ;;
+    --twice) twice=yes ;;
+    *) echo "make_release.sh: the option is '$option'; --windows and --twice are known." >&2; exit 1 ;;
+  esac
+done
 
-make_zip() { # FOLDER of the sources, its name without extension
-  cmake -S "$1" --preset portable -DSTIPPLE_PACKAGE_PARTS="$parts" >/dev/null
-  cmake --build "$1/build/portable" --parallel "$jobs"
-  $python native/package/licences.py "$parts" "$1/build/licences"
-  $python "$1/addon/make_zip.py" --libraries "$1/build/portable/lib" --licences "$1/build/licences" --self-contained \
-    --output "$1/build/$name"
+make_zip() { # FOLDER of the sources
+  cmake -S "$1" --preset $preset -DSTIPPLE_PACKAGE_PARTS="$parts" >/dev/null
+  cmake --build "$1/build/$preset" --parallel "$jobs" --target "${targets[@]}"
+  $python native/package/licences.py "$folder" "$1/build/licences" --platform $platform
+  $python "$1/addon/make_zip.py" --libraries "$1/build/$preset/$libraries" --licences "$1/build/licences" \
+    --self-contained --platform $platform --output "$1/build/$name"
 }
 
-bash native/install_dependencies.sh --package
+bash native/install_dependencies.sh $dependencies
 jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
-name=$($python -c 'import sys; sys.path.insert(0, "addon"); import make_zip; print(make_zip.split_name())')
-bash native/package/make_parts.sh
+name=$($python -c "import sys; sys.path.insert(0, 'addon'); import make_zip; print(make_zip.split_name('$platform'))")
+bash native/package/make_parts.sh "${parts_option[@]}"
 make_zip "$PWD"
 zip=build/$name
-ls -l build/portable/lib
-STIPPLE_ZIP=$PWD/$zip $python -m pytest -q -rs -p no:cacheprovider tests/package
+ls -l "build/$preset/$libraries"
+if [ $platform = windows-x64 ]; then
+  STIPPLE_WINDOWS_ZIP=$PWD/$zip $python -m pytest -q -rs -p no:cacheprovider tests/package/test_windows.py
+else
+  STIPPLE_ZIP=$PWD/$zip $python -m pytest -q -rs -p no:cacheprovider tests/package
+fi
 
-if [ "${1:-}" = --twice ]; then
+if [ -n "$twice" ]; then
   copy=build/second
   rm -rf "$copy"
   mkdir -p "$copy"

@@ -34,18 +34,8 @@ stipple_part(hwy::hwy hwy hwy/highway.h)
 # The same compiler's command as in other builds, so that nothing is compiled twice.
 set_target_properties(hwy::hwy PROPERTIES INTERFACE_COMPILE_DEFINITIONS HWY_SHARED_DEFINE)
 
-# stipple_media_parts(TARGET): the headers of what reads and writes files, before those of this machine.
-function(stipple_media_parts TARGET)
-  set(sources ${STIPPLE_PACKAGE_PARTS}/source)
-  target_include_directories(${TARGET} SYSTEM BEFORE PRIVATE
-    ${STIPPLE_PACKAGE_PARTS}/include ${STIPPLE_PACKAGE_PARTS}/include/openvdb ${STIPPLE_PACKAGE_PARTS}/include/Imath
-    ${STIPPLE_PACKAGE_PARTS}/include/OpenEXR
-    ${sources}/openvdb/openvdb ${sources}/tinygltf ${sources}/png ${sources}/webp/src ${sources}/zlib ${sources}/zstd/lib)
-endfunction()
-# The libraries behind them, each before those that it calls.
-set(STIPPLE_MEDIA_LIBRARIES openvdb blosc lz4 zstd tinygltf png jpeg webp
-  OpenEXR-3_1 Iex-3_1 IlmThread-3_1 OpenEXRCore-3_1 Imath-3_1 z)
-list(TRANSFORM STIPPLE_MEDIA_LIBRARIES REPLACE "^(.+)$" "${STIPPLE_PACKAGE_PARTS}/lib/lib\\1.a")
+set(STIPPLE_PACKAGE_SOURCES ${STIPPLE_PACKAGE_PARTS}/source)
+include(${CMAKE_CURRENT_LIST_DIR}/media_parts.cmake)
 
 # What libraries of others and of the compiler refer to and glibc 2.28 lacks.
 add_library(stipple_older_glibc OBJECT ${CMAKE_CURRENT_LIST_DIR}/older_glibc.c)

@@ -2,6 +2,8 @@
 """Imports the scripts of native/package and addon/make_zip.py, and the binding without the add-on's own __init__."""
 
 import os
+import shutil
+import subprocess
 import sys
 import types
 import zipfile
@@ -10,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+BUILDS = ('portable', 'release')
 sys.path[:0] = [str(ROOT / 'native' / 'package'), str(ROOT / 'addon'), str(ROOT / 'tests' / 'structure')]
 
 _package = types.ModuleType('stipple')
@@ -39,3 +42,51 @@ def release(release_zip, tmp_path_factory):
     with zipfile.ZipFile(release_zip) as archive:
         archive.extractall(folder)
     return folder / 'stipple'
+
+
+@pytest.fixture(scope='session')
+def windows_zip():
+    """The zip for Windows that native/package/make_release.sh --windows has made and hands to these tests."""
+    named = os.environ.get('STIPPLE_WINDOWS_ZIP')
+    if not named:
+        pytest.skip('no zip is named in STIPPLE_WINDOWS_ZIP; bash native/package/make_release.sh --windows makes one')
+    assert Path(named).is_file(), f'{named} is not there'
+    return Path(named)
+
+
+@pytest.fixture(scope='session')
+def windows_library(windows_zip, tmp_path_factory):
+    """stipple.dll as it lies in the zip."""
+    folder = tmp_path_factory.mktemp('dll')
+    with zipfile.ZipFile(windows_zip) as archive:
+        return Path(archive.extract('stipple/lib/stipple.dll', folder))
+
+
+@pytest.fixture(scope='session')
+def wine(tmp_path_factory):
+    """run(program, arguments..., cwd=...): a program of Windows under Wine; returns what it printed and its status."""
+    launcher = shutil.which('wine')
+    if launcher is None:
+        pytest.skip("Wine is not installed, which runs Windows' programs here")
+    environment = os.environ | {'WINEPREFIX': str(tmp_path_factory.mktemp('wine')), 'WINEDEBUG': '-all',
+                                'WINEDLLOVERRIDES': 'mscoree,mshtml,winemenubuilder.exe='}
+    environment.pop('DISPLAY', None)
+
+    def run(program, *arguments, cwd=None, debug='-all'):
+        return subprocess.run([launcher, program, *map(str, arguments)], cwd=cwd, env=environment | {'WINEDEBUG': debug},
+                              capture_output=True, text=True, timeout=600, errors='replace')
+    run.environment = environment
+    subprocess.run([launcher, 'wineboot', '--init'], env=environment, capture_output=True, timeout=300, check=True)
+    yield run
+    server = shutil.which('wineserver') or '/usr/lib/wine/wineserver'
+    subprocess.run([server, '-k'], env=environment, capture_output=True, timeout=60)
+
+
+@pytest.fixture(scope='session')
+def linux_library():
+    """libstipple.so of a build for Linux, whose results those of Windows are compared with."""
+    named = os.environ.get('STIPPLE_LIBRARY')
+    for file in ([Path(named)] if named else [ROOT / 'build' / name / 'lib' / 'libstipple.so' for name in BUILDS]):
+        if file.is_file():
+            return file
+    pytest.skip('there is no build for Linux in build/portable or build/release to compare with')

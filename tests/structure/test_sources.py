@@ -61,6 +61,8 @@ def test_native_targets_link_what_the_table_allows():
     ('native/splat/a.cpp', '  #  include <Eigen/Core>', 'splat may not include Eigen'),
     ('native/api/a.cpp', '#include <openvdb/openvdb.h>', 'api may not include OpenVDB'),
     ('native/splat/a.cpp', '#include <windows.h>', 'nor a known system header'),
+    ('native/io/a.cpp', '#include <sys/mman.h>', 'nor a known system header'),
+    ('native/base/platform/windows/a.cpp', '#include <unistd.h>', 'nor a known system header'),
     ('native/tools/a.cpp', '#include <vector>', 'native/tools is not in the table'),
 ])
 def test_an_include_against_the_table_is_found(tmp_path, name, line, reason):

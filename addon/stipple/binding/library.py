@@ -2,6 +2,7 @@
 """Finds and loads libstipple, and refuses one that does not fit."""
 
 import os
+import sys
 from ctypes import CDLL, c_uint32
 from pathlib import Path
 
@@ -10,7 +11,9 @@ from .declarations import declare
 from .errors import LibraryError
 from .structs import ABI_VERSION
 
-FILE_NAME = 'libstipple.so'
+# What the library is called on each system.
+FILE_NAMES = {'win32': 'stipple.dll'}
+FILE_NAME = FILE_NAMES.get(sys.platform, 'libstipple.so')
 ENVIRONMENT_VARIABLE = 'STIPPLE_LIBRARY'
 
 _loaded = {}

@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdio>
 #include <set>
@@ -7,6 +5,7 @@
 #include <thread>
 
 #include "cli/library.h"
+#include "cli/platform/system.h"
 
 namespace stipple::cli {
 
@@ -25,8 +24,8 @@ void drawBar(const StippleJobProgress& progress) {
   std::fflush(stderr);
 }
 
-/// What a log file gets: each stage once in every tenth of the work. Renders of many samples go back
-/// and forth between two stages hundreds of times.
+/// What a log file gets: each stage once in every tenth of the work. Renders of many samples go
+/// back and forth between two stages hundreds of times.
 class StageLog {
  public:
   void show(const StippleJobProgress& progress) {
@@ -45,7 +44,7 @@ class StageLog {
 }  // namespace
 
 void finish(const Job& job) {
-  const bool terminal = isatty(STDERR_FILENO) != 0;
+  const bool terminal = isTerminal();
   const auto start = std::chrono::steady_clock::now();
   const SignalHold hold;
   StageLog log;

@@ -1,9 +1,9 @@
 #include "cli/jobs/status_line.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
+
+#include "cli/platform/system.h"
 
 namespace stipple::cli {
 
@@ -24,7 +24,7 @@ std::string timeText(double seconds) {
   return text;
 }
 
-StatusLine::StatusLine() : is_terminal_(isatty(STDERR_FILENO) != 0) {}
+StatusLine::StatusLine() : is_terminal_(isTerminal()) {}
 
 void StatusLine::show(double done, const std::string& stage, const std::string& line) {
   if (is_terminal_) {

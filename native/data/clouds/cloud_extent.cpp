@@ -19,8 +19,8 @@ CloudExtent cloudExtent(const SplatCloud& cloud) {
   std::vector<float> values(count);
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t i = 0; i < count; ++i) values[i] = cloud.positions[i * 3 + axis];
-    const auto low = values.begin() + static_cast<long>(count / kLeftOut);
-    const auto high = values.end() - 1 - static_cast<long>(count / kLeftOut);
+    const auto low = values.begin() + static_cast<ptrdiff_t>(count / kLeftOut);
+    const auto high = values.end() - 1 - static_cast<ptrdiff_t>(count / kLeftOut);
     std::nth_element(values.begin(), low, values.end());
     const double a = static_cast<double>(*low);
     std::nth_element(low, high, values.end());

@@ -1,7 +1,5 @@
 #include "data/clouds/splat_cloud.h"
 
-#include <sys/mman.h>
-
 #include <atomic>
 #include <bit>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/platform/memory.h"
 
 namespace stipple {
 
@@ -40,11 +39,9 @@ void resizeFresh(std::vector<float>& values, size_t count) {
   // Whole huge pages inside, so that nothing else of the heap changes.
   const uintptr_t first = (begin + kHugePageBytes - 1) / kHugePageBytes * kHugePageBytes;
   const uintptr_t last = (begin + count * sizeof(float)) / kHugePageBytes * kHugePageBytes;
-  // Advice only: refused where there are no huge pages. Populating is what a write does.
-  madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
+  platform::adviseHugePages(reinterpret_cast<void*>(first), last - first);
   parallelFor((last - first) / kHugePageBytes, 1, [&](size_t page, size_t) {
-    madvise(reinterpret_cast<void*>(first + page * kHugePageBytes), kHugePageBytes,
-            MADV_POPULATE_WRITE);
+    platform::populatePages(reinterpret_cast<void*>(first + page * kHugePageBytes), kHugePageBytes);
   });
   values.resize(count);
 }

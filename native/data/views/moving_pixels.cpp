@@ -98,8 +98,8 @@ std::vector<size_t> StillCameras::around(size_t view) const {
   const size_t count = std::min(camera.size(), kMovingFrames);
   const size_t before = std::min(at, kMovingFrames / 2);
   const size_t begin = std::min(at - before, camera.size() - count);
-  return {camera.begin() + static_cast<long>(begin),
-          camera.begin() + static_cast<long>(begin + count)};
+  return {camera.begin() + static_cast<ptrdiff_t>(begin),
+          camera.begin() + static_cast<ptrdiff_t>(begin + count)};
 }
 
 }  // namespace stipple

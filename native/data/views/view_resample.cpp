@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "base/error.h"
@@ -14,7 +15,7 @@ namespace {
 constexpr size_t kRowsPerTask = 16;
 // A pinhole picture grows without bound towards 90 degrees; at 60 its corners have a quarter of the
 // resolution of its middle.
-const double kMaxExtent = std::tan(60.0 * M_PI / 180.0);
+const double kMaxExtent = std::tan(60.0 * std::numbers::pi / 180.0);
 constexpr int kExtentSteps = 256;
 
 Image emptyLike(const Image& image, uint32_t width, uint32_t height) {

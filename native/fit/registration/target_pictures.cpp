@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -127,7 +128,7 @@ UnitBall ballOfPictures(std::span<const TargetPicture> pictures) {
   for (const Ray& ray : rays) {
     const Vec3d seen = linearPart(ray.camera.world_to_camera) * ball.middle +
                        translationPart(ray.camera.world_to_camera);
-    const double pixels = std::sqrt(ray.area / M_PI);
+    const double pixels = std::sqrt(ray.area / std::numbers::pi);
     const bool is_perspective = ray.camera.model == CameraModel::kPerspective;
     if (is_perspective && !(seen.z() > ray.camera.near_plane)) {
       refuse("what the images show is not before all of their cameras");

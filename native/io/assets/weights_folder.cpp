@@ -2,14 +2,13 @@
 // sizes also follow from the numbers of parameters. No file was ever here.
 #include "io/assets/weights_folder.h"
 
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
 #include "base/error.h"
+#include "base/platform/files.h"
 #include "io/assets/weight_file.h"
 #include "io/bytes/input_file.h"
 #include "io/bytes/safetensors.h"
@@ -60,12 +59,12 @@ struct Candidate {
 };
 
 WeightsFile statusOf(const fs::path& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return {};
+  platform::PathStatus status;
+  if (!platform::statusOf(path.string(), status)) return {};
   WeightsFile file;
   file.path = path.string();
-  file.bytes = static_cast<uint64_t>(status.st_size);
-  file.modified = static_cast<int64_t>(status.st_mtim.tv_sec) * 1000000000 + status.st_mtim.tv_nsec;
+  file.bytes = status.bytes;
+  file.modified = status.modified;
   return file;
 }
 

@@ -1,7 +1,8 @@
 #include "io/assets/weights_place.h"
 
 #include <algorithm>
-#include <cstdlib>
+
+#include "base/platform/environment.h"
 
 namespace stipple {
 
@@ -16,8 +17,7 @@ void WeightsPlace::set(const std::string& folder) {
 }
 
 void WeightsPlace::setByEnvironment() {
-  const char* folder = std::getenv("STIPPLE_WEIGHTS");
-  set(folder != nullptr ? folder : "");
+  set(platform::environmentVariable("STIPPLE_WEIGHTS"));
 }
 
 std::string WeightsPlace::shipped() const {

@@ -1,16 +1,12 @@
 #include "io/bytes/input_file.h"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cctype>
 #include <cerrno>
 #include <filesystem>
 #include <system_error>
 
 #include "base/error.h"
+#include "base/platform/files.h"
 
 namespace stipple {
 
@@ -23,23 +19,23 @@ std::string reason(int error) {
 }  // namespace
 
 InputFile::InputFile(const std::string& path) : path_(path) {
-  // Non-blocking, so that opening a pipe without a writer returns and is refused below.
-  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  descriptor_ = platform::openForReading(path);
   if (descriptor_ < 0) fail(ErrorCode::kIo, path + " cannot be opened: " + reason(errno));
-  struct stat status {};
-  const int failed = ::fstat(descriptor_, &status) != 0 ? errno : 0;
-  if (failed != 0 || !S_ISREG(status.st_mode)) {
-    ::close(descriptor_);
+  platform::PathStatus status;
+  const int failed = platform::statusOfOpen(descriptor_, status) ? 0 : errno;
+  if (failed != 0 || status.kind != platform::PathKind::kFile) {
+    platform::closeFile(descriptor_);
+    const bool is_folder = status.kind == platform::PathKind::kFolder;
     fail(ErrorCode::kIo, path + " cannot be read: " +
-                             (failed != 0               ? reason(failed)
-                              : S_ISDIR(status.st_mode) ? std::string("it is a folder, not a file")
-                                                        : std::string("it is not a regular file")));
+                             (failed != 0 ? reason(failed)
+                              : is_folder ? std::string("it is a folder, not a file")
+                                          : std::string("it is not a regular file")));
   }
-  size_ = static_cast<uint64_t>(status.st_size);
+  size_ = status.bytes;
 }
 
 InputFile::~InputFile() {
-  ::close(descriptor_);
+  platform::closeFile(descriptor_);
 }
 
 void InputFile::readAt(uint64_t offset, void* bytes, size_t count) const {
@@ -50,8 +46,7 @@ void InputFile::readAt(uint64_t offset, void* bytes, size_t count) const {
   }
   auto* target = static_cast<char*>(bytes);
   while (count > 0) {
-    const ssize_t got = ::pread(descriptor_, target, count, static_cast<off_t>(offset));
-    if (got < 0 && errno == EINTR) continue;
+    const int64_t got = platform::readSome(descriptor_, offset, target, count);
     if (got < 0) fail(ErrorCode::kIo, path_ + " cannot be read: " + reason(errno));
     if (got == 0) {
       fail(ErrorCode::kIo, path_ + " became shorter while it was read: byte " +
@@ -66,12 +61,9 @@ void InputFile::readAt(uint64_t offset, void* bytes, size_t count) const {
 std::shared_ptr<const uint8_t> InputFile::map() const {
   const auto length = static_cast<size_t>(size_);
   if (length == 0) fail(ErrorCode::kIo, path_ + " cannot be mapped: it is empty");
-  void* memory = ::mmap(nullptr, length, PROT_READ, MAP_PRIVATE, descriptor_, 0);
-  if (memory == MAP_FAILED) {
-    fail(ErrorCode::kIo, path_ + " cannot be mapped: " + reason(errno));
-  }
-  return {static_cast<const uint8_t*>(memory),
-          [memory, length](const uint8_t*) { ::munmap(memory, length); }};
+  std::shared_ptr<const uint8_t> memory = platform::mapFile(descriptor_, length);
+  if (memory == nullptr) fail(ErrorCode::kIo, path_ + " cannot be mapped: " + reason(errno));
+  return memory;
 }
 
 std::string readTextFile(const std::string& path, uint64_t limit) {

@@ -1,15 +1,12 @@
 #include "io/bytes/output_file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <atomic>
 #include <cerrno>
 #include <filesystem>
 #include <system_error>
 
 #include "base/error.h"
+#include "base/platform/files.h"
 #include "io/bytes/temporary_files.h"
 
 namespace stipple {
@@ -31,7 +28,7 @@ constexpr int kMaxLinks = 40;
 
 std::string temporaryName(const fs::path& target) {
   static std::atomic<unsigned> counter{0};
-  const std::string name = temporaryFileName(::getpid(), counter.fetch_add(1));
+  const std::string name = temporaryFileName(platform::processNumber(), counter.fetch_add(1));
   // Same folder, because only there a rename is atomic; same extension, because some libraries
   // choose the format by it. Short, so that no file name becomes longer than the system allows.
   return (target.parent_path() / (name + target.extension().string())).string();
@@ -54,36 +51,36 @@ std::string outputTarget(const std::string& path) {
 
 OutputFile::OutputFile(const std::string& path) : path_(path) {
   const fs::path target = outputTarget(path);
-  struct stat status {};
-  const bool exists = ::stat(target.c_str(), &status) == 0;
+  platform::PathStatus status;
+  const bool exists = platform::statusOf(target.string(), status);
   // Renaming over a device or a pipe would replace it.
-  if (exists && S_ISDIR(status.st_mode)) failWriting(path, "it is a folder");
-  if (exists && !S_ISREG(status.st_mode)) failWriting(path, "it is not a regular file");
+  if (status.kind == platform::PathKind::kFolder) failWriting(path, "it is a folder");
+  if (status.kind == platform::PathKind::kOther) failWriting(path, "it is not a regular file");
   // A rename asks only the folder for permission; a file that is read-only stays as it is.
-  if (exists && ::access(target.c_str(), W_OK) != 0) failWriting(path, reason(errno));
-  const mode_t mode = exists ? status.st_mode & 0777 : 0666;
+  if (exists && !platform::isWritable(target.string())) failWriting(path, reason(errno));
+  const unsigned permissions = exists ? status.permissions : 0666;
   sweepTemporaryFiles(target.parent_path());
   int descriptor = -1;
   do {
     temporary_path_ = temporaryName(target);
-    descriptor = ::open(temporary_path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+    descriptor = platform::createFile(temporary_path_, permissions);
   } while (descriptor < 0 && errno == EEXIST);
   if (descriptor < 0) failWriting(path, reason(errno));
-  lock_ = lockTemporaryFile(descriptor);
-  file_ = ::fdopen(descriptor, "wb");
+  lock_ = platform::lockFile(descriptor);
+  file_ = platform::streamOf(descriptor);
   if (file_ == nullptr) {
     const int error = errno;
-    ::close(descriptor);
-    if (lock_ >= 0) ::close(lock_);
-    ::unlink(temporary_path_.c_str());
+    platform::closeFile(descriptor);
+    if (lock_ >= 0) platform::closeFile(lock_);
+    platform::removeFile(temporary_path_);
     failWriting(path, reason(error));
   }
 }
 
 OutputFile::~OutputFile() {
   if (file_ != nullptr) std::fclose(file_);
-  if (!committed_) ::unlink(temporary_path_.c_str());
-  if (lock_ >= 0) ::close(lock_);
+  if (!committed_) platform::removeFile(temporary_path_);
+  if (lock_ >= 0) platform::closeFile(lock_);
 }
 
 void OutputFile::write(const void* bytes, size_t count) {
@@ -99,11 +96,10 @@ void OutputFile::writeAt(uint64_t offset, const void* bytes, size_t count) {
   if (file_ == nullptr) {
     fail(ErrorCode::kInternal, path_ + " is written after its handle was given away");
   }
-  const int descriptor = ::fileno(file_);
+  const int descriptor = platform::descriptorOf(file_);
   const auto* source = static_cast<const char*>(bytes);
   while (count > 0) {
-    const ssize_t put = ::pwrite(descriptor, source, count, static_cast<off_t>(offset));
-    if (put < 0 && errno == EINTR) continue;
+    const int64_t put = platform::writeSome(descriptor, offset, source, count);
     if (put <= 0) failWriting(path_, reason(put < 0 ? errno : ENOSPC));
     source += put;
     offset += static_cast<uint64_t>(put);
@@ -121,15 +117,9 @@ void OutputFile::handOver() {
 void OutputFile::commit() {
   if (committed_) return;
   handOver();
-  // A new descriptor serves both cases: fsync concerns the file and not the handle.
-  const int descriptor = ::open(temporary_path_.c_str(), O_WRONLY | O_CLOEXEC);
-  if (descriptor < 0) failWriting(path_, reason(errno));
-  const int sync_error = ::fsync(descriptor) != 0 ? errno : 0;
-  const int close_error = ::close(descriptor) != 0 ? errno : 0;
-  if (sync_error != 0) failWriting(path_, reason(sync_error));
-  if (close_error != 0) failWriting(path_, reason(close_error));
+  if (!platform::syncFile(temporary_path_)) failWriting(path_, reason(errno));
   const std::string target = outputTarget(path_);
-  if (::rename(temporary_path_.c_str(), target.c_str()) != 0) failWriting(path_, reason(errno));
+  if (!platform::replaceFile(temporary_path_, target)) failWriting(path_, reason(errno));
   committed_ = true;
 }
 

@@ -1,14 +1,12 @@
 #include "io/bytes/output_kind.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <system_error>
 
 #include "base/error.h"
+#include "base/platform/files.h"
 #include "io/bytes/input_file.h"
 #include "io/bytes/output_file.h"
 
@@ -27,7 +25,7 @@ void requireFolder(const std::string& path, const fs::path& target) {
   const std::string folder = parent.empty() ? "." : parent.string();
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) failWriting(path, "there is no folder '" + folder + "'");
-  if (::access(folder.c_str(), W_OK) != 0) {
+  if (!platform::isWritable(folder)) {
     failWriting(path, "the folder '" + folder + "' is read-only");
   }
 }
@@ -46,14 +44,14 @@ void requireOutputKind(const std::string& path, const std::string& what,
                        const std::function<bool(const std::string&)>& is_of_kind) {
   const std::string target = outputTarget(path);
   requireFolder(path, target);
-  struct stat status {};
-  if (::stat(target.c_str(), &status) != 0) {
+  platform::PathStatus status;
+  if (!platform::statusOf(target, status)) {
     if (errno == ENOENT) return;
     failWriting(path, std::generic_category().message(errno));
   }
-  if (S_ISDIR(status.st_mode)) failWriting(path, "it is a folder");
-  if (!S_ISREG(status.st_mode)) failWriting(path, "it is not a regular file");
-  if (status.st_size == 0 || isOfKind(target, is_of_kind)) return;
+  if (status.kind == platform::PathKind::kFolder) failWriting(path, "it is a folder");
+  if (status.kind != platform::PathKind::kFile) failWriting(path, "it is not a regular file");
+  if (status.bytes == 0 || isOfKind(target, is_of_kind)) return;
   fail(ErrorCode::kInvalidArgument, path + " is a file of another kind, which " + what +
                                         " would replace; choose another name, or remove it");
 }

@@ -1,8 +1,6 @@
 // Based on: FIPS 180-4, Secure Hash Standard, sections 4.1.2, 5.1.1 and 6.2.
 #include "io/bytes/sha256.h"
 
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/platform/files.h"
 #include "io/bytes/input_file.h"
 
 namespace stipple {
@@ -57,9 +56,8 @@ HashMemory& hashMemory() {
 }
 
 int64_t modifiedTime(const std::string& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return 0;
-  return static_cast<int64_t>(status.st_mtim.tv_sec) * 1000000000 + status.st_mtim.tv_nsec;
+  platform::PathStatus status;
+  return platform::statusOf(path, status) ? status.modified : 0;
 }
 
 }  // namespace

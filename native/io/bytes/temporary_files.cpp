@@ -1,18 +1,13 @@
 #include "io/bytes/temporary_files.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <system_error>
+
+#include "base/platform/files.h"
 
 namespace stipple {
 
@@ -25,11 +20,11 @@ constexpr char kPrefix[] = ".stipple-";
 constexpr auto kSweepInterval = std::chrono::minutes(1);
 
 /// The process in a name that temporaryFileName() has made; nothing for other names.
-std::optional<pid_t> processOf(const std::string& name) {
+std::optional<long> processOf(const std::string& name) {
   const size_t start = sizeof(kPrefix) - 1;
   if (name.compare(0, start, kPrefix) != 0) return std::nullopt;
   const char* const end = name.data() + name.size();
-  pid_t process = 0;
+  long process = 0;
   unsigned number = 0;
   const auto first = std::from_chars(name.data() + start, end, process);
   if (first.ec != std::errc() || process <= 0 || first.ptr == end || *first.ptr != '-') {
@@ -38,18 +33,6 @@ std::optional<pid_t> processOf(const std::string& name) {
   const auto second = std::from_chars(first.ptr + 1, end, number);
   if (second.ec != std::errc() || (second.ptr != end && *second.ptr != '.')) return std::nullopt;
   return process;
-}
-
-void removeIfLeft(const fs::path& path, pid_t process) {
-  if (::kill(process, 0) == 0 || errno != ESRCH) return;
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-  if (descriptor < 0) return;
-  struct stat status {};
-  if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) &&
-      ::flock(descriptor, LOCK_EX | LOCK_NB) == 0) {
-    ::unlink(path.c_str());
-  }
-  ::close(descriptor);
 }
 
 /// Whether this process has not looked at the folder lately.
@@ -71,21 +54,14 @@ std::string temporaryFileName(long process, unsigned number) {
   return kPrefix + std::to_string(process) + "-" + std::to_string(number);
 }
 
-int lockTemporaryFile(int descriptor) {
-  // A lock belongs to what both descriptors share: it lasts until the second is closed.
-  const int lock = ::fcntl(descriptor, F_DUPFD_CLOEXEC, 0);
-  if (lock >= 0) ::flock(lock, LOCK_EX | LOCK_NB);
-  return lock;
-}
-
 void sweepTemporaryFiles(const fs::path& folder) {
   std::error_code error;
   const fs::path absolute = fs::absolute(folder.empty() ? fs::path(".") : folder, error);
   if (error || !isDue(absolute)) return;
   fs::directory_iterator entry(absolute, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    const std::optional<pid_t> process = processOf(entry->path().filename().string());
-    if (process) removeIfLeft(entry->path(), *process);
+    const std::optional<long> process = processOf(entry->path().filename().string());
+    if (process && !platform::mayLive(*process)) platform::removeUnlocked(entry->path().string());
   }
 }
 

@@ -8,11 +8,6 @@ namespace stipple {
 /// What a temporary file of a process is called, without an extension.
 std::string temporaryFileName(long process, unsigned number);
 
-/// Locks a temporary file as long as what is returned stays open, which is at the longest as long
-/// as the process lives. In: descriptor of the file, which may be closed before. Returns: a
-/// descriptor, or -1 where the system has no locks.
-int lockTemporaryFile(int descriptor);
-
 /// Removes what processes that have ended left in a folder. A process looks at a folder when it
 /// first writes there, and again a minute later at the earliest: a sequence of images would read it
 /// for each of them. A file stays where its process may live: one of this machine has its number,

@@ -2,6 +2,7 @@
 // 4 (GLB).
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <string>
 
@@ -96,7 +97,7 @@ void stipple_media_mesh_write(const char* path, const StippleMediaMesh* mesh,
                                         " bytes; a .glb holds less than 4 GiB, a .ply more");
     }
     const tinygltf::Model model = modelOf(*mesh);
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
+    std::ofstream file(std::filesystem::path(path), std::ios::binary | std::ios::trunc);
     tinygltf::TinyGLTF writer;
     // What it returns says nothing of the disk: the stream does.
     writer.WriteGltfSceneToStream(&model, file, false, true);

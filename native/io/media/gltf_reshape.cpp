@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -82,7 +83,7 @@ class WholeGlb {
     for (size_t i = 0; i < 5; ++i) storeLittleEndian(numbers[i], &heads[i * 4]);
     storeLittleEndian(static_cast<uint32_t>(binary_.size()), &heads[20]);
     storeLittleEndian(kBinaryChunk, &heads[24]);
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
+    std::ofstream file(std::filesystem::path(path), std::ios::binary | std::ios::trunc);
     file.write(reinterpret_cast<const char*>(heads.data()), 20);
     file.write(text.data(), static_cast<std::streamsize>(text.size()));
     file.write(reinterpret_cast<const char*>(heads.data() + 20), 8);

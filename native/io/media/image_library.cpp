@@ -4,6 +4,7 @@
 #include <OpenImageIO/imageio.h>
 
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -90,7 +91,7 @@ void write(const char* path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, c
       !output->write_image(type, pixels) || !output->close()) {
     fail(ErrorCode::kIo, std::string(path) + " cannot be written: " + output->geterror());
   }
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  std::ofstream file(std::filesystem::path(path), std::ios::binary | std::ios::trunc);
   file.write(reinterpret_cast<const char*>(bytes.buffer().data()),
              static_cast<std::streamsize>(bytes.buffer().size()));
   finishFile(file, path);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -77,7 +78,7 @@ void fillTree(Tree& tree, const StippleMediaVolume& volume, const float* values,
 class CheckedArchive : public openvdb::io::Archive {
  public:
   void writeFile(const char* path, const openvdb::GridPtrVec& grids) const {
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
+    std::ofstream file(std::filesystem::path(path), std::ios::binary | std::ios::trunc);
     if (file) write(file, grids, /*seekable=*/true);
     finishFile(file, path);
   }
@@ -116,7 +117,9 @@ void writeVolume(const char* path, const StippleMediaVolume& volume) {
 class CheckedFile {
  public:
   explicit CheckedFile(const char* path)
-      : file_(path), header_(readVolumeHeader(file_)), stream_(path, std::ios::binary) {
+      : file_(path),
+        header_(readVolumeHeader(file_)),
+        stream_(std::filesystem::path(path), std::ios::binary) {
     // OpenVDB reads on after the end of a file, and takes what lies in memory for lengths.
     stream_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
     openvdb::io::setVersion(stream_, {header_.library_major, header_.library_minor},
@@ -153,9 +156,9 @@ class CheckedFile {
     }
     const openvdb::Index64 voxels = grid->activeVoxelCount();
     if (voxels > kMaxVoxels) {
-      fail(ErrorCode::kMemoryLimit,
-           what + " holds " + std::to_string(voxels) + " active voxels; at most " +
-               std::to_string(kMaxVoxels) + " can be read");
+      fail(ErrorCode::kMemoryLimit, what + " holds " + std::to_string(voxels) +
+                                        " active voxels; at most " + std::to_string(kMaxVoxels) +
+                                        " can be read");
     }
     requireAllowed(voxels * kVoxelBytes, kVoxelAllowance, file_.size(), file_.path(),
                    "the " + std::to_string(voxels) + " active voxels of the grid '" + name + "'");

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <numbers>
 
 #include "base/default_init_vector.h"
 #include "base/error.h"
@@ -93,7 +94,8 @@ class Reader {
   Reader(const std::string& path, Progress* progress)
       : files_(path), progress_(progress), meta_(readMeta()) {
     for (size_t byte = 0; byte < 256; ++byte) {
-      components_[byte] = (static_cast<double>(byte) / 255.0 * 2.0 - 1.0) * M_SQRT1_2;
+      components_[byte] =
+          (static_cast<double>(byte) / 255.0 * 2.0 - 1.0) * (std::numbers::sqrt2 / 2);
     }
   }
 

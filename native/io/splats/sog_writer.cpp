@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <utility>
 
 #include "base/error.h"
@@ -216,7 +217,8 @@ class Encoder {
       }
       // q and -q turn alike; the largest component is not stored and taken as positive. The others
       // are at most sqrt(1/2).
-      const double factor = (q[largest] < 0 ? -M_SQRT2 : M_SQRT2) / std::sqrt(squares);
+      constexpr double kRoot = std::numbers::sqrt2;
+      const double factor = (q[largest] < 0 ? -kRoot : kRoot) / std::sqrt(squares);
       size_t next = 0;
       for (size_t k = 0; k < 4; ++k) {
         if (k == largest) continue;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -194,7 +195,7 @@ class FrameReader {
       return positive(length_key, *length);
     }
     if (const std::optional<double> angle = number(angle_key)) {
-      if (!(*angle > 0.0) || !(*angle < M_PI)) {
+      if (!(*angle > 0.0) || !(*angle < std::numbers::pi)) {
         failHere(std::string("has ") + angle_key + " = " + std::to_string(*angle) +
                  " rad; more than 0 and less than pi is needed");
       }
@@ -216,8 +217,8 @@ class FrameReader {
       camera.fy = camera.fx;
     } else if (camera.model == CameraModel::kEquirectangular) {
       // All around, whatever focal lengths say: writers do not agree on theirs.
-      camera.fx = (width > 0 ? width : 1.0) / (2 * M_PI);
-      camera.fy = (height > 0 ? height : 0.5) / M_PI;
+      camera.fx = (width > 0 ? width : 1.0) / (2 * std::numbers::pi);
+      camera.fy = (height > 0 ? height : 0.5) / std::numbers::pi;
     } else {
       const std::optional<double> fx = focal("fl_x", "camera_angle_x", width);
       // Without a size an angle over the height says nothing about the width.

@@ -151,7 +151,8 @@ class FrameFolders {
     }
     for (const NumberedFrame& frame : frames) {
       DatasetView view{sized, {}, {}, {}};
-      view.view.image_path = (fs::path(camera.image_path).parent_path() / frame.file_name).string();
+      view.view.image_path =
+          (fs::path(camera.image_path).parent_path() / frame.file_name).generic_string();
       view.view.frame = frame.number;
       view.image_path = (around_ / view.view.image_path).string();
       view.mask_path = masks.of(mask_name(view.view.image_path));

@@ -108,7 +108,7 @@ DatasetFiles findPoseBoundsFiles(const std::string& bounds, bool with_frames) {
     for (const NumberedFrame& frame : folder.frames) {
       DatasetView view;
       view.view = camera;
-      view.view.image_path = (folder.name / frame.file_name).string();
+      view.view.image_path = (folder.name / frame.file_name).generic_string();
       view.view.frame = frame.number;
       view.image_path = (dataset / view.view.image_path).string();
       view.is_of_folder = true;

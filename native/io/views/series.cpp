@@ -77,7 +77,7 @@ std::string labelOf(const fs::path& folder) {
   if (parts.size() > 1 && parts.back() == "images") parts.pop_back();
   fs::path label;
   for (const fs::path& part : parts) label /= part;
-  return label.string();
+  return label.generic_string();
 }
 
 /// What views of a camera that stands still share.

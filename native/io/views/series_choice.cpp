@@ -50,7 +50,7 @@ std::vector<size_t> evenChoice(const std::vector<SeriesPlace>& places, uint64_t 
       chosen.push_back(of_camera[camera].front());
       of_camera[camera].erase(of_camera[camera].begin());
       // The next one moves up to where this one was.
-      waiting.erase(waiting.begin() + static_cast<long>(i));
+      waiting.erase(waiting.begin() + static_cast<ptrdiff_t>(i));
       waiting.push_back(camera);
     }
     for (size_t k = begin; k < end; ++k) of_camera[places[order[k]].camera].clear();

@@ -2,8 +2,6 @@
 // docs/methods/voxelization.md.
 #include "splat/voxels/voxelize.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -14,6 +12,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "base/parallel.h"
+#include "base/platform/memory.h"
 #include "splat/voxels/voxelize_bricks.h"
 #include "splat/voxels/voxelize_kernel.h"
 #include "splat/voxels/voxelize_splat.h"
@@ -49,11 +48,7 @@ std::string mebibytes(double bytes) {
 
 // No limit still means the memory of this machine: beyond it the system ends the process.
 uint64_t effectiveLimit(uint64_t memory_limit_bytes) {
-  const long pages = sysconf(_SC_PHYS_PAGES);
-  const long page_size = sysconf(_SC_PAGE_SIZE);
-  if (pages <= 0 || page_size <= 0) return memory_limit_bytes;
-  return std::min(memory_limit_bytes,
-                  static_cast<uint64_t>(pages) * static_cast<uint64_t>(page_size));
+  return std::min(memory_limit_bytes, platform::machineMemory());
 }
 
 void requireMemory(double bytes, const char* qualifier, uint64_t limit, double voxel_size) {

@@ -78,7 +78,7 @@ double typicalSize(const SplatCloud& cloud) {
     const float* s = &cloud.scales[i * 3];
     sizes[i] = std::max(std::min(s[0], s[1]), std::min(std::max(s[0], s[1]), s[2]));
   }
-  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
+  const auto middle = sizes.begin() + static_cast<ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   return static_cast<double>(*middle);
 }

@@ -98,7 +98,8 @@ struct Trainer::Pace {
   double recent() const {
     const size_t count = std::min(step_seconds.size(), kRecentIterations);
     if (count == 0) return 0;
-    return std::accumulate(step_seconds.end() - static_cast<long>(count), step_seconds.end(), 0.0) /
+    return std::accumulate(step_seconds.end() - static_cast<ptrdiff_t>(count), step_seconds.end(),
+                           0.0) /
            static_cast<double>(count);
   }
 };

@@ -67,7 +67,7 @@ Vec3d insidePlace(const SplatCloud& cloud, const CloudExtent& extent, uint64_t s
                   uint32_t index) {
   const size_t stride = (cloud.size() + kSplatsToAsk - 1) / kSplatsToAsk;
   std::vector<double> squared((cloud.size() + stride - 1) / stride);
-  const auto kept = squared.begin() + static_cast<long>(squared.size() / kMayBeNearer);
+  const auto kept = squared.begin() + static_cast<ptrdiff_t>(squared.size() / kMayBeNearer);
   Vec3d best = centreOf(extent);
   double farthest = -1;
   for (uint32_t attempt = 0; attempt < kPlacesToTry; ++attempt) {

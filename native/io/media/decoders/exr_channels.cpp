@@ -113,7 +113,9 @@ void readPart(Imf::MultiPartInputFile& file, int index, const Part& part,
 }
 
 void readChannels(const std::string& path, uint64_t limit_bytes, const StippleMediaSink& sink) {
-  Imf::MultiPartInputFile file(path.c_str());
+  const InputFile bytes(path);  // says why where it cannot be opened
+  ExrStream stream(path);
+  Imf::MultiPartInputFile file(stream.stream);
   const Layout layout = layoutOf(file, path);
   if (layout.plane_bytes > limit_bytes) {
     fail(ErrorCode::kMemoryLimit,
@@ -121,7 +123,7 @@ void readChannels(const std::string& path, uint64_t limit_bytes, const StippleMe
              std::to_string(layout.plane_bytes) + " bytes in all; at most " +
              std::to_string(limit_bytes) + " bytes are allowed");
   }
-  requireAllowed(layout.plane_bytes, kImageAllowance, InputFile(path).size(), path,
+  requireAllowed(layout.plane_bytes, kImageAllowance, bytes.size(), path,
                  std::to_string(layout.channels.size()) + " channels");
   give(sink, kMediaChannels, layout.channels);
   giveBytes(sink, kMediaChannelNames, layout.names.data(), layout.names.size());

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -25,7 +26,10 @@ namespace {
 class ExrPicture final : public PictureFile {
  public:
   explicit ExrPicture(const std::string& path) try
-      : path_(path), file_(path.c_str()), channels_(exrChannels(file_.header(0), path)) {
+      : path_(path),
+        bytes_(path),
+        file_(bytes_.stream),
+        channels_(exrChannels(file_.header(0), path)) {
     head_ = exrWindows(file_.header(0), path);
     head_.is_floating_point = true;
     head_.value_bytes = 2;
@@ -70,6 +74,7 @@ class ExrPicture final : public PictureFile {
 
  private:
   std::string path_;
+  ExrStream bytes_;
   Imf::MultiPartInputFile file_;
   std::vector<ExrChannel> channels_;
   PictureHead head_;
@@ -107,7 +112,7 @@ void writeExr(const char* path, const StippleMediaImage& image, const float* pix
     output.writePixels(static_cast<int>(image.height));
   }
   const std::string text = bytes.str();
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  std::ofstream file(std::filesystem::path(path), std::ios::binary | std::ios::trunc);
   file.write(text.data(), static_cast<std::streamsize>(text.size()));
   finishFile(file, path);
 }

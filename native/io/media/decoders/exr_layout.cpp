@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <utility>
 
 #include "base/error.h"
@@ -25,6 +26,9 @@ std::pair<std::string, size_t> rankOf(const std::string& name) {
 }
 
 }  // namespace
+
+ExrStream::ExrStream(const std::string& path)
+    : bytes(std::filesystem::path(path), std::ios::binary), stream(bytes, path.c_str()) {}
 
 std::vector<ExrChannel> exrChannels(const Imf::Header& header, const std::string& name) {
   if (header.hasType() && (header.type() == Imf::DEEPSCANLINE || header.type() == Imf::DEEPTILE)) {

@@ -2,13 +2,22 @@
 
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfPixelType.h>
+#include <OpenEXR/ImfStdIO.h>
 
+#include <fstream>
 #include <string>
 #include <vector>
 
 #include "io/media/picture_file.h"
 
 namespace stipple::media {
+
+/// An open file. OpenEXR's own way to open one asks Windows for short names alone.
+struct ExrStream {
+  explicit ExrStream(const std::string& path);
+  std::ifstream bytes;
+  Imf::StdIFStream stream;
+};
 
 struct ExrChannel {
   std::string name;

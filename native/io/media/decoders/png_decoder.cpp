@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <utility>
@@ -163,7 +164,7 @@ std::unique_ptr<PictureFile> openPng(PictureBytes bytes) {
 void writePng(const char* path, const StippleMediaImage& image, const uint8_t* pixels) {
   PngWriter writer(path);
   const std::vector<unsigned char>& bytes = writer.write(image, pixels);
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  std::ofstream file(std::filesystem::path(path), std::ios::binary | std::ios::trunc);
   file.write(reinterpret_cast<const char*>(bytes.data()),
              static_cast<std::streamsize>(bytes.size()));
   finishFile(file, path);

@@ -34,7 +34,7 @@ std::optional<PlyType> typeFromName(const std::string& name) {
 }
 
 /// What a message may show of a file's own text: printable, short.
-std::string quoted(std::string_view text) {
+std::string inQuotes(std::string_view text) {
   std::string shown = "'";
   for (const char c : text.substr(0, 60)) shown += c >= 32 && c < 127 ? c : '?';
   return shown + (text.size() > 60 ? "...'" : "'");
@@ -50,7 +50,7 @@ class HeaderParser {
   PlyHeader parse() {
     if (file_.size() == 0) failHere("the file is empty; a PLY file starts with 'ply'");
     if (text_.rfind("ply\n", 0) != 0 && text_.rfind("ply\r\n", 0) != 0) {
-      failHere("it starts with " + quoted(std::string_view(text_).substr(0, 8)) +
+      failHere("it starts with " + inQuotes(std::string_view(text_).substr(0, 8)) +
                "; a PLY file starts with a line 'ply'");
     }
     nextLine();
@@ -72,7 +72,7 @@ class HeaderParser {
       } else if (keyword == "property") {
         parseProperty(words, line);
       } else {
-        failHere("line " + lineName() + " is " + quoted(line) +
+        failHere("line " + lineName() + " is " + inQuotes(line) +
                  "; format, comment, element, property or end_header is expected");
       }
     }
@@ -112,7 +112,7 @@ class HeaderParser {
     } else if (encoding == "binary_big_endian") {
       header_.encoding = PlyEncoding::kBigEndian;
     } else {
-      failHere("line " + lineName() + " is " + quoted(line) +
+      failHere("line " + lineName() + " is " + inQuotes(line) +
                "; ascii, binary_little_endian or binary_big_endian is expected");
     }
   }
@@ -124,7 +124,7 @@ class HeaderParser {
     const char* end = count.data() + count.size();
     const auto [stop, error] = std::from_chars(count.data(), end, element.count);
     if (error != std::errc() || stop != end || count.empty()) {
-      failHere("line " + lineName() + " is " + quoted(line) +
+      failHere("line " + lineName() + " is " + inQuotes(line) +
                "; 'element NAME COUNT' with a whole number is expected");
     }
     header_.elements.push_back(std::move(element));
@@ -147,14 +147,14 @@ class HeaderParser {
     const bool whole_count =
         count_type && *count_type <= PlyType::kUint32;  // a list's length is a whole number
     if (!type || !whole_count || property.name.empty()) {
-      failHere("line " + lineName() + " is " + quoted(line) +
+      failHere("line " + lineName() + " is " + inQuotes(line) +
                "; 'property TYPE NAME' or 'property list TYPE TYPE NAME' is expected");
     }
     property.type = *type;
     property.count_type = *count_type;
     for (const PlyProperty& other : header_.elements.back().properties) {
       if (other.name == property.name) {
-        failHere("property " + quoted(property.name) + " stands twice");
+        failHere("property " + inQuotes(property.name) + " stands twice");
       }
     }
     header_.elements.back().properties.push_back(std::move(property));
