@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -193,6 +194,26 @@ TEST(SplatsOfClip, ShowOneKeyFrameWhereNothingBlends) {
   EXPECT_EQ(splatsOfClip(clip, source, 2.6, 0).opacities, second.opacities);
   clip.blend = KeyFrameBlend::kLinear;
   EXPECT_NEAR(splatsOfClip(clip, source, 2.25, 0).opacities[0], 0.75f * first.opacities[0], 1e-6);
+}
+
+TEST(KeyFrame, ItsNetworkDoesNotMoveAllAnchorsAlike) {
+  // Weights of the last layer, as a step of Adam leaves them; planes as they begin on the mean.
+  KeyFrame frame = someFrame(20, 5, true);
+  const auto farthest = [&] {
+    DeformationTape tape;
+    AnchorArrays deformed;
+    deform(frame.deformation, frame.scaffold, 20, 0.4, tape, deformed);
+    float most = 0;
+    for (size_t i = 0; i < deformed.positions.size(); ++i) {
+      most = std::max(most, std::abs(deformed.positions[i] - frame.scaffold.positions[i]));
+    }
+    return most;
+  };
+  EXPECT_GT(farthest(), 1e-3f) << "by how their places differ";
+  for (HexPlane& plane : frame.deformation.planes.planes()) {
+    std::fill(plane.values.begin(), plane.values.end(), 1.0f);
+  }
+  EXPECT_LT(farthest(), 1e-5f);
 }
 
 TEST(KeyFrame, ComesBackFromTensorsBitForBit) {
