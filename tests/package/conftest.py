@@ -20,6 +20,14 @@ _package.__path__ = [str(ROOT / 'addon' / 'stipple')]
 sys.modules.setdefault('stipple', _package)
 
 
+def _named_zip(variable, command):
+    named = os.environ.get(variable)
+    if not named:
+        pytest.skip(f'no zip is named in {variable}; {command} makes one and runs this')
+    assert Path(named).is_file(), f'{named} is not there'
+    return Path(named)
+
+
 @pytest.fixture(scope='session')
 def root():
     return ROOT
@@ -28,11 +36,7 @@ def root():
 @pytest.fixture(scope='session')
 def release_zip():
     """The zip that native/package/make_release.sh has made and hands to these tests."""
-    named = os.environ.get('STIPPLE_ZIP')
-    if not named:
-        pytest.skip('no zip is named in STIPPLE_ZIP; bash native/package/make_release.sh makes one and runs this')
-    assert Path(named).is_file(), f'{named} is not there'
-    return Path(named)
+    return _named_zip('STIPPLE_ZIP', 'bash native/package/make_release.sh')
 
 
 @pytest.fixture(scope='session')
@@ -47,11 +51,7 @@ def release(release_zip, tmp_path_factory):
 @pytest.fixture(scope='session')
 def windows_zip():
     """The zip for Windows that native/package/make_release.sh --windows has made and hands to these tests."""
-    named = os.environ.get('STIPPLE_WINDOWS_ZIP')
-    if not named:
-        pytest.skip('no zip is named in STIPPLE_WINDOWS_ZIP; bash native/package/make_release.sh --windows makes one')
-    assert Path(named).is_file(), f'{named} is not there'
-    return Path(named)
+    return _named_zip('STIPPLE_WINDOWS_ZIP', 'bash native/package/make_release.sh --windows')
 
 
 @pytest.fixture(scope='session')

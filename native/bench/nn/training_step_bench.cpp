@@ -89,7 +89,7 @@ class AutoencoderSteps {
     std::shared_ptr<TrainingObject> object_;
   };
 
-  /// Of all levels that the surface reaches into, which the density is asked about.
+  /// Cells of all levels that the surface reaches into: the density is asked about each.
   static size_t cellCount() {
     const auto object = Ball().object(0);
     std::set<std::pair<int, uint64_t>> cells;

@@ -46,8 +46,9 @@ class RelayModel final : public FitModel {
       : options_(options),
         voxel_(voxel),
         times_(std::move(times)),
-        parts_(std::make_shared<RelayParts>(
-            std::move(store), relaySegments(options.iterations, options.clip), shapeOf(start))),
+        parts_(std::make_shared<RelayParts>(std::move(store),
+                                            relaySegments(options.iterations, options.clip),
+                                            shapeOf(*start.scaffold))),
         anchor_counts_(options.clip.keyCount(), start.scaffold->size()),
         pass_(backends.makeViewPass()) {
     work_.state = std::move(start);
@@ -164,11 +165,6 @@ class RelayModel final : public FitModel {
   }
 
  private:
-  static ScaffoldShape shapeOf(const ScaffoldState& state) {
-    const ScaffoldParameters& scaffold = *state.scaffold;
-    return {scaffold.gaussians, scaffold.sh_degree, scaffold.colour_space, scaffold.antialias, 0};
-  }
-
   const std::vector<RelaySegment>& segments() const { return parts_->segments(); }
 
   size_t segmentAt(uint64_t steps) const {

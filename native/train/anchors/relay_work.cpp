@@ -53,10 +53,6 @@ void takeMoments(const char* stem, const TensorTable& table, std::vector<Moments
   }
 }
 
-ScaffoldShape shapeOf(const ScaffoldParameters& scaffold) {
-  return {scaffold.gaussians, scaffold.sh_degree, scaffold.colour_space, scaffold.antialias, 0};
-}
-
 }  // namespace
 
 uint64_t RelayWork::bytes() const {

@@ -53,6 +53,10 @@ void ScaffoldState::keep(const std::vector<uint32_t>& rows) {
   levels.swap(kept);
 }
 
+ScaffoldShape shapeOf(const ScaffoldParameters& scaffold) {
+  return {scaffold.gaussians, scaffold.sh_degree, scaffold.colour_space, scaffold.antialias, 0};
+}
+
 ScaffoldState startState(ScaffoldParameters scaffold) {
   ScaffoldState state;
   state.scaffold = std::make_shared<ScaffoldParameters>(std::move(scaffold));
@@ -82,9 +86,7 @@ TensorTable tensorsOf(const ScaffoldState& state) {
 }
 
 ScaffoldState scaffoldStateOf(const TensorTable& table, const ScaffoldState& like) {
-  const ScaffoldParameters& shape = *like.scaffold;
-  ScaffoldState state = startState(scaffoldOfTensors(
-      table, {shape.gaussians, shape.sh_degree, shape.colour_space, shape.antialias, 0}));
+  ScaffoldState state = startState(scaffoldOfTensors(table, shapeOf(*like.scaffold)));
   const size_t anchors = state.scaffold->size();
   if (anchors > kMostAnchors) {
     fail(ErrorCode::kFormat, "the checkpoint has " + std::to_string(anchors) + " anchors");

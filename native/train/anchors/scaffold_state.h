@@ -27,6 +27,9 @@ struct ScaffoldState {
   void keep(const std::vector<uint32_t>& rows);
 };
 
+/// What a scaffold with the same networks is made by.
+ScaffoldShape shapeOf(const ScaffoldParameters& scaffold);
+
 /// Moments of 0.
 ScaffoldState startState(ScaffoldParameters scaffold);
 
