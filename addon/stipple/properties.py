@@ -31,6 +31,8 @@ COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: texture
 BAKE_SIZE_TEXT = ("Side of the square image that the light of an object is baked into, in pixels; 0 for 1024. The time "
                   "that it takes grows with its square. What shines is baked at the size of its textures")
 BAKE_SAMPLES_TEXT = "Rays of light for each pixel of the image: more of them take longer and leave less noise"
+BAKE_VIEWS_TEXT = ("Bake what reflects and refracts from 36 directions as well, so that it changes with the view. Blurred "
+                   "reflections come out well, mirrors do not. Takes a few times longer")
 
 BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"),
                 ('COUNT', "Count", "The budget is a number of splats"))
@@ -108,12 +110,15 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                            default=0, min=0, max=4096, subtype='PIXEL', options=set(), override=_OVERRIDABLE)
     bake_samples: IntProperty(name="Bake Samples", description=BAKE_SAMPLES_TEXT + ". Takes effect with Update from "
                               "Source", default=32, min=1, soft_max=1024, options=set(), override=_OVERRIDABLE)
+    bake_views: BoolProperty(name="View-Dependent", description=BAKE_VIEWS_TEXT + ". Takes effect with Update from "
+                             "Source", default=False, options=set(), override=_OVERRIDABLE)
     refine: BoolProperty(name="Refine", description=mesh_models.REFINE_TEXT + ". Takes effect with Update from Source",
                          default=False, options=set(), override=_OVERRIDABLE)
     # What the present source was made with, to say when the settings above differ.
     source_detail_weight: FloatProperty(options={'HIDDEN'})
     source_color_from: StringProperty(options={'HIDDEN'})
     source_refine: BoolProperty(options={'HIDDEN'})
+    source_bake_views: BoolProperty(options={'HIDDEN'})
     source_bake: IntVectorProperty(size=2, default=(0, 32), options={'HIDDEN'})
     source_objects: CollectionProperty(type=STIPPLE_PG_source_object)
     source_fingerprint: StringProperty(options={'HIDDEN'})

@@ -4,6 +4,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
+#include "mesh/view_harmonics.h"
 #include "model/surface_splats.h"
 
 using namespace stipple;
@@ -38,6 +39,12 @@ SurfaceModelOptions modelOptions(const StippleModelFromMeshOptions& given) {
   }
   options.sampling.detail_weight = given.detail_weight;
   options.sampling.seed = given.seed;
+  if (given.harmonic_degree > static_cast<uint32_t>(kMaxViewDegree)) {
+    fail(ErrorCode::kInvalidArgument, "options->harmonic_degree is " +
+                                          std::to_string(given.harmonic_degree) +
+                                          "; 0 to 3 is allowed");
+  }
+  options.sampling.harmonic_degree = static_cast<int>(given.harmonic_degree);
   return options;
 }
 
@@ -51,6 +58,7 @@ void stipple_model_from_mesh_options_init(StippleModelFromMeshOptions* options) 
   options->struct_size = sizeof(StippleModelFromMeshOptions);
   options->leaf_level = static_cast<uint32_t>(kMaxLeafLevel);
   options->detail_weight = 1.0;
+  options->harmonic_degree = static_cast<uint32_t>(SurfaceSamplingOptions().harmonic_degree);
 }
 
 StippleStatus stipple_model_from_mesh_start(StippleContext* context, const StippleMesh* mesh,

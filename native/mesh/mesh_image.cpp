@@ -52,6 +52,20 @@ struct MeshView {
   }
 };
 
+std::array<float, 4> colourOf(const MeshView& view, size_t triangle, const Vec3d& weights) {
+  if (!view.colour.changesWithView(triangle)) {
+    return view.colour.at(triangle, placeOf(weights), 0.0, 0);
+  }
+  const std::array<Vec3d, 3> c = view.corners(triangle);
+  // From the eye to the place, in the camera, turned into the world.
+  const Vec3d place = weights.x() * c[0] + weights.y() * c[1] + weights.z() * c[2];
+  const Vec3d direction = linearPart(view.camera.world_to_camera).transpose() * place.normalized();
+  return view.colour.seenAlong(
+      {static_cast<float>(direction.x()), static_cast<float>(direction.y()),
+       static_cast<float>(direction.z())},
+      triangle, placeOf(weights));
+}
+
 void drawTriangles(const MeshView& view, std::vector<uint64_t>& nearest, Progress* progress) {
   const TriangleRaster raster(view.camera);
   const size_t width = view.camera.width;
@@ -92,7 +106,7 @@ std::array<double, 4> gathered(const MeshView& view, const TriangleRaster& raste
       double z = 0;
       Vec3d weights(1, 0, 0);
       raster.meet(flat, x, y, z, weights);
-      const std::array<float, 4> colour = view.colour.at(triangle, placeOf(weights), 0.0, 0);
+      const std::array<float, 4> colour = colourOf(view, triangle, weights);
       for (size_t c = 0; c < 3; ++c) sum[c] += static_cast<double>(colour[c]);
       sum[3] += 1;
     }

@@ -126,7 +126,8 @@ void validate(const MeshPart& part, const TriMesh& mesh) {
                                             std::to_string(mesh.materials.size()));
     }
     const MaterialColour colour = mesh.materials[index].colour;
-    if (colour == MaterialColour::kTexture && !part.corner_uvs) {
+    const bool has_views = !mesh.materials[index].view_textures.empty();
+    if ((colour == MaterialColour::kTexture || has_views) && !part.corner_uvs) {
       fail(ErrorCode::kInvalidArgument,
            "the material of triangle " + std::to_string(i) +
                " takes its colour from a texture, but the mesh has no UV map");

@@ -12,11 +12,53 @@ namespace {
 constexpr double kPlastic1 = 0.7548776662466927;  ///< 1/g, g^3 = g + 1
 constexpr double kPlastic2 = 0.5698402909980532;  ///< 1/g^2
 constexpr uint64_t kMaxTapCount = 8;
+/// Weights of view directions around a direction are exp(s cos), with s this share of their number:
+/// the nearest of M even directions is on average 1 / M of the sphere's height away.
+constexpr float kViewSharpness = 1.0f;
+constexpr float kLeastViewWeight = 0.02f;  ///< of the nearest direction's
 
 }  // namespace
 
 SurfaceColour::SurfaceColour(const TriMesh& mesh) : mesh_(mesh) {
   for (const Image& image : mesh.textures) textures_.emplace_back(image);
+  view_sharpness_ = kViewSharpness * static_cast<float>(mesh.view_directions.size() / 3);
+}
+
+bool SurfaceColour::changesWithView(size_t triangle) const {
+  return !materialOf(triangle).view_textures.empty();
+}
+
+void SurfaceColour::addedByViews(size_t triangle, const Barycentric& place,
+                                 std::span<float> added) const {
+  const std::vector<uint32_t>& views = materialOf(triangle).view_textures;
+  for (size_t i = 0; i < views.size(); ++i) {
+    const std::array<float, 4> value = lookUp(textures_[views[i]], triangle, place);
+    std::copy(value.begin(), value.begin() + 3, added.begin() + static_cast<std::ptrdiff_t>(i * 3));
+  }
+}
+
+std::array<float, 4> SurfaceColour::seenAlong(const std::array<float, 3>& direction,
+                                              size_t triangle, const Barycentric& place) const {
+  std::array<float, 4> colour = at(triangle, place, 0.0, 0);
+  const std::vector<uint32_t>& views = materialOf(triangle).view_textures;
+  if (views.empty()) return colour;
+  const auto cosineOf = [&](size_t i) {
+    const float* d = &mesh_.view_directions[i * 3];
+    return d[0] * direction[0] + d[1] * direction[1] + d[2] * direction[2];
+  };
+  float nearest = -1;
+  for (size_t i = 0; i < views.size(); ++i) nearest = std::max(nearest, cosineOf(i));
+  float sum = 0;
+  std::array<float, 3> added = {0, 0, 0};
+  for (size_t i = 0; i < views.size(); ++i) {
+    const float weight = std::exp(view_sharpness_ * (cosineOf(i) - nearest));
+    if (weight < kLeastViewWeight) continue;
+    const std::array<float, 4> value = lookUp(textures_[views[i]], triangle, place);
+    for (size_t c = 0; c < 3; ++c) added[c] += weight * value[c];
+    sum += weight;
+  }
+  for (size_t c = 0; c < 3; ++c) colour[c] = std::max(0.0f, colour[c] + added[c] / sum);
+  return colour;
 }
 
 const Material& SurfaceColour::materialOf(size_t triangle) const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "data/meshes/tri_mesh.h"
@@ -23,6 +24,15 @@ class SurfaceColour {
   std::array<float, 4> at(size_t triangle, const Barycentric& place, double share,
                           uint64_t random) const;
 
+  /// Whether a triangle looks different from different sides.
+  bool changesWithView(size_t triangle) const;
+  /// Scene linear, [M,3]: what comes to the colour of a place from each of the mesh's view
+  /// directions. In: a triangle that changesWithView().
+  void addedByViews(size_t triangle, const Barycentric& place, std::span<float> added) const;
+  /// The colour of a place seen along a unit direction, between the view directions around it.
+  std::array<float, 4> seenAlong(const std::array<float, 3>& direction, size_t triangle,
+                                 const Barycentric& place) const;
+
   /// Whether any place of a triangle may have an opacity below 1.
   bool mayBeTransparent(size_t triangle) const;
 
@@ -36,6 +46,7 @@ class SurfaceColour {
 
   const TriMesh& mesh_;
   std::vector<TextureLookup> textures_;
+  float view_sharpness_ = 0;  ///< of the weights of view directions between them
 };
 
 }  // namespace stipple

@@ -7,14 +7,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "data/clouds/splat_cloud.h"
+#include "math/colour.h"
 #include "mesh/surface_colour.h"
 #include "mesh/surface_detail.h"
+#include "mesh/view_harmonics.h"
 
 namespace stipple {
 
@@ -101,6 +106,10 @@ void requireOptions(const SurfaceSamplingOptions& options) {
     fail(ErrorCode::kInvalidArgument, "surface sample count is " + std::to_string(options.count) +
                                           "; 1 to 268435456 is allowed");
   }
+  if (options.harmonic_degree < 0 || options.harmonic_degree > kMaxViewDegree) {
+    fail(ErrorCode::kInvalidArgument,
+         "harmonic degree is " + std::to_string(options.harmonic_degree) + "; 0 to 3 is allowed");
+  }
   if (!std::isfinite(options.detail_weight) || options.detail_weight < 0) {
     fail(ErrorCode::kInvalidArgument,
          "detail weight is " + std::to_string(options.detail_weight) + "; 0 or more is allowed");
@@ -116,8 +125,9 @@ struct Place {
 /// Makes samples of places.
 class Sampler {
  public:
-  Sampler(const TriMesh& mesh, const std::vector<double>& running)
-      : mesh_(mesh), running_(running), colour_(mesh) {}
+  /// views: of the mesh's view directions, or null: colours are those along the normal.
+  Sampler(const TriMesh& mesh, const std::vector<double>& running, const ViewHarmonics* views)
+      : mesh_(mesh), running_(running), colour_(mesh), views_(views) {}
 
   double areaOf(size_t triangle) const {
     return running_[triangle] - (triangle == 0 ? 0.0 : running_[triangle - 1]);
@@ -140,16 +150,43 @@ class Sampler {
     }
     samples.opacities[i] = colour[3];
     samples.areas[i] = static_cast<float>(area);
+    if (views_ && colour_.changesWithView(triangle)) fitViews(triangle, at, samples, i);
   }
 
+  PointSet emptySamples(size_t count, int harmonic_degree) const;
+
  private:
+  /// Harmonics of sample i, and the mean of its colours in place of that along its normal.
+  void fitViews(size_t triangle, const Barycentric& at, PointSet& samples, size_t i) const {
+    std::vector<float> added(views_->directionCount() * 3);
+    colour_.addedByViews(triangle, at, added);
+    std::array<float, 48> fitted;
+    const size_t stride = samples.harmonicStride();
+    float* colour = &samples.colours[i * 3];
+    views_->fit(&samples.normals[i * 3], colour, added, std::span(fitted).first(stride + 3));
+    for (size_t c = 0; c < 3; ++c) {
+      colour[c] = srgbToLinear(std::max(0.0f, kShC0 * fitted[c] + 0.5f));
+    }
+    std::copy_n(fitted.begin() + 3, stride, &samples.harmonics[i * stride]);
+  }
+
   const TriMesh& mesh_;
   const std::vector<double>& running_;
   SurfaceColour colour_;
+  const ViewHarmonics* views_;
 };
 
-PointSet emptySamples(size_t count) {
+/// The harmonics that the options ask for, where anything looks different from different sides.
+std::optional<ViewHarmonics> harmonicsOf(const TriMesh& mesh, int degree) {
+  const auto changes = [](const Material& material) { return !material.view_textures.empty(); };
+  if (degree == 0 || std::ranges::none_of(mesh.materials, changes)) return std::nullopt;
+  return ViewHarmonics(mesh.view_directions, degree);
+}
+
+PointSet Sampler::emptySamples(size_t count, int harmonic_degree) const {
   PointSet samples;
+  if (views_) samples.harmonic_degree = harmonic_degree;
+  samples.harmonics.resize(count * samples.harmonicStride(), 0.0f);
   samples.positions.resize(count * 3);
   samples.normals.resize(count * 3);
   samples.colours.resize(count * 3);
@@ -240,7 +277,7 @@ std::vector<size_t> partsOf(const std::vector<float>& detail, uint64_t further) 
 /// The samples with parts in the place of each, and the detail of every part.
 PointSet split(const Sampler& sampler, const std::vector<Place>& places, const PointSet& even,
                const std::vector<size_t>& begins, uint64_t seed, std::vector<float>& detail) {
-  PointSet samples = emptySamples(begins.back());
+  PointSet samples = sampler.emptySamples(begins.back(), even.harmonic_degree);
   std::vector<float> of_parts(samples.size());
   parallelFor(places.size(), kSampleGrain, [&](size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) {
@@ -274,9 +311,10 @@ PointSet sampleSurface(const TriMesh& mesh, const SurfaceSamplingOptions& option
   const std::vector<double> running = runningAreas(mesh);
   const size_t count = options.count;
   const double stratum = running.back() / static_cast<double>(count);
-  const Sampler sampler(mesh, running);
+  const std::optional<ViewHarmonics> views = harmonicsOf(mesh, options.harmonic_degree);
+  const Sampler sampler(mesh, running, views ? &*views : nullptr);
   const std::vector<Place> places = evenPlaces(running, count, options.seed, progress);
-  PointSet samples = emptySamples(count);
+  PointSet samples = sampler.emptySamples(count, options.harmonic_degree);
   parallelFor(count, kSampleGrain, [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     for (size_t i = begin; i < end; ++i) {

@@ -14,6 +14,9 @@ struct SurfaceSamplingOptions {
   double detail_weight = 1.0;  ///< >= 0; 0: anchors are uniform over the area; 1: places with
                                ///< texture detail or curvature attract several times more
   uint64_t seed = 0;
+  /// 0..kMaxViewDegree: of the harmonics of samples whose material looks different from different
+  /// sides. 0: they have the colour along their normal.
+  int harmonic_degree = kMaxViewDegree;
 };
 
 /// Area-weighted, stratified samples of every triangle of a mesh, with normals (interpolated),

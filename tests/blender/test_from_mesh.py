@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes to splats: what goes in, where colours come from, what stands afterwards."""
 
+import math
+
 import bpy
 import numpy as np
 import pytest
@@ -339,11 +341,11 @@ def test_size_and_samples_of_the_bake_are_settings(stipple, monkeypatch):
     seen = []
     run = stipple.scene.bake._run_cycles
 
-    def noted(obj, kind, samples):
+    def noted(obj, kind, samples, view_from):
         side = next(node.image.size[0] for node in obj.data.materials[0].node_tree.nodes
                     if node.type == 'TEX_IMAGE' and node.image.name.startswith('stipple_bake'))
         seen.append((kind, side, samples))
-        run(obj, kind, samples)
+        run(obj, kind, samples, view_from)
     monkeypatch.setattr(stipple.scene.bake, '_run_cycles', noted)
     quad = glowing_quad(side=256, lines=32)
     obj = scenes.make_splats(quad, anchors=1000, color_from='BAKED', bake_size=128, bake_samples=2)
@@ -392,3 +394,56 @@ def test_a_smooth_budget_is_between_powers_of_two(stipple, tmp_path):
     assert count(data) == 1024
     settings.detail = 0.5
     assert count(data) == 2048
+
+
+def shining_ball():
+    """A blue ball of half rough plastic under a sun, with a camera that sees the highlight from one side."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+    ball = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    scenes.material('plastic', (0.02, 0.05, 0.3), ball)
+    shader = scenes.principled(ball.data.materials[0])
+    shader.inputs['Roughness'].default_value = 0.4
+    sun = bpy.data.lights.new('sun', 'SUN')
+    sun.energy = 4.0
+    lamp = bpy.data.objects.new('sun', sun)
+    lamp.rotation_euler = (0.8, 0.0, 0.6)
+    scenes.link(lamp)
+    return ball
+
+
+def seen_from(angles, engine, tmp_path, side=96):
+    """Images [side,side,3], scene linear over black, from points around the middle at 4 m."""
+    scene = bpy.context.scene
+    camera = scenes.link(bpy.data.objects.new('eye', bpy.data.cameras.new('eye')))
+    scene.camera, scene.render.engine = camera, engine
+    scene.render.resolution_x = scene.render.resolution_y = side
+    scene.render.resolution_percentage, scene.render.film_transparent = 100, True
+    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    images = []
+    for angle in angles:
+        camera.location = (4 * math.cos(angle), 4 * math.sin(angle), 1.5)
+        camera.rotation_euler = (-camera.location).to_track_quat('-Z', 'Y').to_euler()
+        images.append(scenes.render_pixels(tmp_path)[..., :3])
+    bpy.data.objects.remove(camera)
+    return np.array(images)
+
+
+def test_view_dependent_light_follows_the_camera(stipple, tmp_path):
+    """A highlight lies elsewhere from each side; along the normal, all sides show the same."""
+    ball = shining_ball()
+    angles = (-2.2, -1.2, -0.2, 0.9)
+    truth = seen_from(angles, 'CYCLES', tmp_path)
+    errors = {}
+    for views in (False, True):
+        ball.hide_set(False)
+        ball.hide_render = False
+        result = scenes.make_splats(ball, anchors=8000, color_from='BAKED', bake_size=256, bake_samples=16,
+                                    bake_views=views)
+        settings = result.data.stipple
+        assert settings.bake_views is settings.source_bake_views is views
+        assert len(stipple.scene.source.splat_data.read(result.data).sh[0]) == (16 if views else 1)
+        errors[views] = np.mean((seen_from(angles, 'STIPPLE', tmp_path) - truth) ** 2)
+        bpy.data.objects.remove(result)
+    # Measured: 0.34, where noise and the ball's outline stay. A fit that is turned or mirrored is worse than none.
+    assert errors[True] < 0.5 * errors[False]

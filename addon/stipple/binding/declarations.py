@@ -76,6 +76,7 @@ FUNCTIONS = {
     'stipple_mesh_free': (None, [_handle]),
     'stipple_mesh_add_texture': (_status, [_handle, c_uint32, c_uint32, c_uint32, _floats, c_uint32,
                                            POINTER(c_uint32)]),
+    'stipple_mesh_set_view_directions': (_status, [_handle, _floats, c_uint32]),
     'stipple_mesh_add_material': (_status, [_handle, _to(s.StippleMaterial), POINTER(c_uint32)]),
     'stipple_mesh_add_part': (_status, [_handle, _to(s.StippleMeshPart)]),
     'stipple_mesh_load': (_status, [_handle, _path, _out_handle]),

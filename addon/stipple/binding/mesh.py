@@ -71,9 +71,20 @@ class Mesh(Handle):
                                                           1 if srgb else 0, byref(index)))
         return index.value
 
-    def add_material(self, colour=MaterialColour.CONSTANT, base_colour=(0.8, 0.8, 0.8, 1.0), texture=NO_INDEX):
-        """base_colour: scene linear, straight alpha. Returns the index."""
+    def set_view_directions(self, directions):
+        """directions [M,3], unit, from the eye to the surface, in the world: what view textures are of."""
+        directions = contiguous(directions)
+        self._check(self.library.stipple_mesh_set_view_directions(self.pointer, pointer_to(directions),
+                                                                  len(directions)))
+
+    def add_material(self, colour=MaterialColour.CONSTANT, base_colour=(0.8, 0.8, 0.8, 1.0), texture=NO_INDEX,
+                     view_textures=None):
+        """base_colour: scene linear, straight alpha. view_textures: for each view direction the index of a texture of
+        what comes to the colour along it, or None. Returns the index."""
         material = StippleMaterial(colour=int(colour), base_colour=(c_float * 4)(*base_colour), texture=texture)
+        if view_textures is not None:
+            views = contiguous(np.array(view_textures), np.uint32)
+            material.view_count, material.view_textures = len(views), pointer_to(views)
         index = c_uint32()
         self._check(self.library.stipple_mesh_add_material(self.pointer, byref(material), byref(index)))
         return index.value

@@ -72,7 +72,7 @@ class Model(Handle):
     job_function = 'stipple_job_model'
 
     @staticmethod
-    def from_mesh_start(context, mesh, detail_weight=1.0, seed=0, leaf_level=10, sample_count=0):
+    def from_mesh_start(context, mesh, detail_weight=1.0, seed=0, leaf_level=10, sample_count=0, harmonic_degree=None):
         """A job that makes a Model."""
         if seed < 0:
             raise invalid(f'Seed is {seed}; allowed are 0 and above.')
@@ -82,6 +82,8 @@ class Model(Handle):
         options.seed = seed
         options.leaf_level = leaf_level
         options.sample_count = sample_count
+        if harmonic_degree is not None:
+            options.harmonic_degree = harmonic_degree
         return Job(context.library, new_handle(context.library, 'stipple_model_from_mesh_start', context.pointer,
                                                mesh.pointer, byref(options)))
 

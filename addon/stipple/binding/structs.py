@@ -102,7 +102,7 @@ class StippleGrade(_Sized):
 
 class StippleMaterial(_Sized):
     _fields_ = [('struct_size', c_uint32), ('colour', c_uint32), ('base_colour', c_float * 4),
-                ('texture', c_uint32), ('reserved', c_uint32)]
+                ('texture', c_uint32), ('view_count', c_uint32), ('view_textures', POINTER(c_uint32))]
 
 
 class StippleMeshPart(_Sized):
@@ -167,7 +167,7 @@ class StippleAnchorBuffers(_Sized):
 
 class StippleModelFromMeshOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('sample_count', c_uint64), ('seed', c_uint64),
-                ('detail_weight', c_double)]
+                ('detail_weight', c_double), ('harmonic_degree', c_uint32), ('reserved', c_uint32)]
 
 
 class StippleModelFromCloudOptions(_Sized):

@@ -11,7 +11,7 @@ from ..binding.model import DecodeSettings
 from ..binding.structs import AnchorOrder
 from ..jobs import JobOperator
 from ..panels.text import draw_anchors, draw_color_from
-from ..properties import BAKE_SAMPLES_TEXT, BAKE_SIZE_TEXT, COLOR_SOURCES, ORDERS
+from ..properties import BAKE_SAMPLES_TEXT, BAKE_SIZE_TEXT, BAKE_VIEWS_TEXT, COLOR_SOURCES, ORDERS
 from ..scene import bake, meshes
 from ..scene.source import mesh_models, source_paths, sources, splat_data, sync
 
@@ -38,6 +38,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
     bake_size: IntProperty(name="Bake Size", description=BAKE_SIZE_TEXT, default=0, min=0, max=4096,
                            subtype='PIXEL')
     bake_samples: IntProperty(name="Bake Samples", description=BAKE_SAMPLES_TEXT, default=32, min=1, soft_max=1024)
+    bake_views: BoolProperty(name="View-Dependent", description=BAKE_VIEWS_TEXT, default=False)
     hide_source: BoolProperty(name="Hide Source", description="Hide the meshes in the viewport and in renders",
                               default=True)
     source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
@@ -59,7 +60,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         native = sources.context()
         self._notes = []
         mesh = meshes.native_mesh(native, self._objects, context.evaluated_depsgraph_get(), self.color_from, self._notes,
-                                  baking=bake.Settings(self.bake_size, self.bake_samples))
+                                  baking=bake.Settings(self.bake_size, self.bake_samples, self.bake_views))
         return mesh_models.start(native, mesh, self._settings(), self.detail_weight, self.refine)
 
     def finish(self, context, job):
@@ -80,6 +81,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
             stipple.order, stipple.seed = self.order, self.seed
             stipple.detail_weight, stipple.color_from = self.detail_weight, self.color_from
             stipple.bake_size, stipple.bake_samples = self.bake_size, self.bake_samples
+            stipple.bake_views = self.bake_views
             stipple.refine = self.refine
             mesh_models.attach(obj.data, path, self._objects, model)
         sync.write_decoded(obj.data, splats)

@@ -41,8 +41,9 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         native = sources.context()
         self._notes = []
         with meshes.shown(context, self._sources):
+            baking = bake.Settings(stipple.bake_size, stipple.bake_samples, stipple.bake_views)
             mesh = meshes.native_mesh(native, self._sources, context.evaluated_depsgraph_get(), stipple.color_from,
-                                      self._notes, baking=bake.Settings(stipple.bake_size, stipple.bake_samples))
+                                      self._notes, baking=baking)
         return mesh_models.start(native, mesh, made, stipple.detail_weight, stipple.refine)
 
     def finish(self, _context, job):

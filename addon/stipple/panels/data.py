@@ -273,6 +273,7 @@ def _draw_warnings(layout, data):
     elif stipple.source_objects and (stipple.source_detail_weight != stipple.detail_weight
                                      or stipple.source_color_from != stipple.color_from
                                      or stipple.source_refine != stipple.refine
+                                     or stipple.source_bake_views != stipple.bake_views
                                      or tuple(stipple.source_bake) != (stipple.bake_size, stipple.bake_samples)):
         _draw_update(layout, "Source settings have changed")
     if bpy.ops.stipple.upgrade_to_point_cloud.poll():

@@ -41,3 +41,4 @@ def draw_color_from(layout, owner):
     if owner.color_from == 'BAKED':
         layout.prop(owner, 'bake_size')
         layout.prop(owner, 'bake_samples')
+        layout.prop(owner, 'bake_views')

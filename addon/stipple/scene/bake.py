@@ -3,7 +3,8 @@
 
 Every triangle gets half of a square of its own, the larger the larger it is, so no UV map is needed and
 nothing bleeds from one triangle to another. Emission is baked apart from the light that falls on a surface: it
-is free of noise, so one sample is enough and the resolution can be that of its textures.
+is free of noise, so one sample is enough and the resolution can be that of its textures. What reflects and refracts
+changes with the side that it is seen from: its change from the colour along the normal is baked from some directions.
 """
 
 import contextlib
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 import bmesh
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from .. import version
 from ..binding.errors import StippleError
@@ -29,14 +30,21 @@ SMALLEST_PX, LEAST_PX = 6, 4
 # Triangles keep this far from their cell's border, so that filtering never reaches a neighbour.
 INSET_PX = 1.5
 LIGHT_PASSES = {'DIRECT', 'INDIRECT', 'DIFFUSE', 'GLOSSY', 'TRANSMISSION'}
+# What changes with the view; it is smooth between directions that harmonics can show, so coarse squares and few samples
+# do: many of both go into one splat.
+VIEW_PASSES = LIGHT_PASSES - {'DIFFUSE'}
+VIEW_SIDE_SHARE, VIEW_SAMPLES_SHARE = 4, 4
+VIEW_DIRECTIONS = 36
 
 
 @dataclass(frozen=True)
 class Settings:
-    """side: pixels along the atlas of an object, 0: LIGHT_SIDE_PX; samples: rays of light per pixel."""
+    """side: pixels along the atlas of an object, 0: LIGHT_SIDE_PX; samples: rays of light per pixel; views: whether
+    what changes with the view is baked as well."""
 
     side: int = 0
     samples: int = 32
+    views: bool = False
 
 
 class Baked:
@@ -60,8 +68,18 @@ class Baked:
             self._images[kind] = pixels
         return self._images[kind]
 
-    def _bake(self, kind):
-        side = self._sides.light if kind == 'COMBINED' else self._sides.fine
+    def view_images(self):
+        """For each of view_directions(), pixels [side,side,3] of what comes to COMBINED along it."""
+        with _view_camera() as camera:
+            along_normal = self._bake('VIEW')
+            images = []
+            for direction in view_directions():
+                camera.matrix_world = Vector(direction.tolist()).to_track_quat('-Z', 'Y').to_matrix().to_4x4()
+                images.append(self._bake('VIEW', 'ACTIVE_CAMERA') - along_normal)
+            return images
+
+    def _bake(self, kind, view_from='ABOVE_SURFACE'):
+        side = {'COMBINED': self._sides.light, 'VIEW': self._sides.view}.get(kind, self._sides.fine)
         image = bpy.data.images.new('stipple_bake', side, side, alpha=True, float_buffer=True)
         kept = list(self.mesh.materials)
         made = []
@@ -73,7 +91,7 @@ class Baked:
                     self.mesh.materials[slot] = material
                 else:
                     self.mesh.materials.append(material)
-            _run_cycles(self.object, kind, self._samples)
+            _run_cycles(self.object, kind, self._samples, view_from)
             values = np.empty(side * side * 4, np.float32)
             image.pixels.foreach_get(values)
             values = values.reshape(side, side, 4)[::-1, :, :3]
@@ -170,10 +188,11 @@ def _triangulate(mesh):
 
 @dataclass(frozen=True)
 class _Sides:
-    """Pixels along an atlas of light, and along one that takes a sample a pixel."""
+    """Pixels along an atlas of light, along one that takes a sample a pixel, and along one of a view direction."""
 
     light: int
     fine: int
+    view: int
 
 
 def _texture_side(materials):
@@ -194,10 +213,11 @@ def _atlas(areas, light_px, texture_px):
         raise StippleError(f'A mesh to be baked has {count:,} triangles; allowed are '
                            f'{2 * (MAX_SIDE_PX // LEAST_PX) ** 2:,}.', Status.ERROR_UNSUPPORTED)
 
-    def unit_of(side_px):
-        return min(max(side_px // units, SMALLEST_PX), MAX_SIDE_PX // units)
+    def unit_of(side_px, least=SMALLEST_PX):
+        return min(max(side_px // units, least), MAX_SIDE_PX // units)
     unit_px = unit_of(light_px)
-    sides = _Sides(units * unit_px, units * max(unit_px, unit_of(texture_px)))
+    sides = _Sides(units * unit_px, units * max(unit_px, unit_of(texture_px)),
+                   units * unit_of(light_px // VIEW_SIDE_SHARE, LEAST_PX))
     order = np.argsort(-areas, kind='stable')
     wide = _square_sides(np.sqrt(areas[order[::2]]), units)
     corner = _corners(wide)
@@ -213,7 +233,8 @@ def _atlas(areas, light_px, texture_px):
     first = np.stack([np.hstack([low, low]), np.hstack([high - gap, low]), np.hstack([low, high - gap])], 1)
     second = np.stack([np.hstack([high, high]), np.hstack([low + gap, high]), np.hstack([high, low + gap])], 1)
     corners = np.where(is_second[:, None, None], second, first)
-    # The insets are of the coarser atlas; in the finer one they are wider.
+    # The insets are of the atlas of light; in the finer one they are wider, in that of views narrower: there a little
+    # of the neighbor's shine gets in, which is nearly the same.
     return sides, ((origin[:, None, :] + corners) / sides.light).astype(np.float32)
 
 
@@ -272,18 +293,48 @@ def _emit_base_colour(material):
     tree.links.new(emission.outputs[0], output.inputs['Surface'])
 
 
-def _run_cycles(obj, kind, samples):
+def view_directions():
+    """[VIEW_DIRECTIONS,3] unit, from the eye to the surface, even over the sphere (a Fibonacci lattice)."""
+    i = np.arange(VIEW_DIRECTIONS) + 0.5
+    z = 1 - 2 * i / VIEW_DIRECTIONS
+    angle = i * (math.pi * (3 - math.sqrt(5)))
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], 1).astype(np.float32)
+
+
+@contextlib.contextmanager
+def _view_camera():
+    """An orthographic camera of our own, which is the scene's meanwhile."""
+    scene = bpy.context.scene
+    kept = scene.camera
+    data = bpy.data.cameras.new('stipple_bake')
+    data.type = 'ORTHO'
+    camera = bpy.data.objects.new('stipple_bake', data)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    try:
+        yield camera
+    finally:
+        scene.camera = kept
+        bpy.data.objects.remove(camera)
+        bpy.data.cameras.remove(data)
+
+
+def _run_cycles(obj, kind, samples, view_from):
     scene = bpy.context.scene
     render, cycles = scene.render, scene.cycles
     kept = (render.engine, cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling,
-            render.bake.use_selected_to_active, render.bake.use_clear, render.bake.margin)
+            render.bake.use_selected_to_active, render.bake.use_clear, render.bake.margin, render.bake.view_from)
     render.engine = 'CYCLES'
-    cycles.samples = samples if kind == 'COMBINED' else 1
+    cycles.samples = {'COMBINED': samples, 'VIEW': max(1, samples // VIEW_SAMPLES_SHARE)}.get(kind, 1)
     cycles.use_denoising = False
     cycles.use_adaptive_sampling = False
     render.bake.use_selected_to_active = False
+    render.bake.view_from = view_from
     options = {'type': 'COMBINED', 'pass_filter': LIGHT_PASSES}
-    if kind in {'BAKE_EMIT', 'EMISSION'}:
+    if kind == 'VIEW':
+        options['pass_filter'] = VIEW_PASSES
+    elif kind in {'BAKE_EMIT', 'EMISSION'}:
         options = {'type': 'EMIT'}
     elif kind == 'BAKE_DIFFUSE':
         options = {'type': 'DIFFUSE', 'pass_filter': {'COLOR'}}
@@ -295,4 +346,4 @@ def _run_cycles(obj, kind, samples):
         raise StippleError(f"Baking the colors failed: {str(error).strip()}.", Status.ERROR_INTERNAL) from None
     finally:
         (render.engine, cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling,
-         render.bake.use_selected_to_active, render.bake.use_clear, render.bake.margin) = kept
+         render.bake.use_selected_to_active, render.bake.use_clear, render.bake.margin, render.bake.view_from) = kept

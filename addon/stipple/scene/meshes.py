@@ -49,7 +49,7 @@ def native_mesh(context, objects, depsgraph, color_from, notes=None, may_be_empt
     it.
     """
     mesh = Mesh.create(context)
-    materials = _Materials(mesh, [] if notes is None else notes)
+    materials = _Materials(mesh, [] if notes is None else notes, baking.views and color_from == 'BAKED')
     placed, shapes = [], {}
     try:
         _collect(objects, depsgraph, color_from, placed, shapes)
@@ -221,7 +221,7 @@ def _with_colours(read, kinds, materials, color_from, baked):
         return part
     if baked is not None and color_from == 'BAKED':
         part['corner_uvs'] = baked.uvs
-        part['triangle_materials'] = np.full(count, materials.baked(baked.image('COMBINED')), np.uint32)
+        part['triangle_materials'] = np.full(count, materials.baked_light(baked), np.uint32)
         return part
     uvs = colours = None
     baked_materials = {}
@@ -274,10 +274,13 @@ def _attribute(read, name):
 class _Materials:
     """Native materials and textures, each made once."""
 
-    def __init__(self, mesh, notes):
+    def __init__(self, mesh, notes, with_views):
         self._mesh = mesh
         self._notes = notes
         self._indices = {}
+        self._with_views = with_views
+        if with_views:
+            mesh.set_view_directions(bake.view_directions())
 
     def constant(self, rgba):
         return self._once(('constant', rgba), lambda: self._mesh.add_material(base_colour=rgba))
@@ -301,6 +304,14 @@ class _Materials:
     def baked(self, pixels):
         texture = self._mesh.add_texture(pixels, srgb=False)
         return self._mesh.add_material(MaterialColour.TEXTURE, texture=texture)
+
+    def baked_light(self, baked):
+        """What an object shows in the light of the scene, from all sides alike or as it changes with them."""
+        if not self._with_views:
+            return self.baked(baked.image('COMBINED'))
+        texture = self._mesh.add_texture(baked.image('COMBINED'), srgb=False)
+        views = [self._mesh.add_texture(pixels, srgb=False) for pixels in baked.view_images()]
+        return self._mesh.add_material(MaterialColour.TEXTURE, texture=texture, view_textures=views)
 
     def _once(self, key, make):
         if key not in self._indices:

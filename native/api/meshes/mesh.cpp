@@ -15,6 +15,7 @@ using namespace stipple::api;
 namespace {
 
 constexpr uint32_t kMaxTextureSide = 65536;
+constexpr uint32_t kMaxViewDirections = 1024;
 
 /// The mesh to change; a copy where a job holds a share of it.
 TriMesh& writable(StippleMesh& handle) {
@@ -108,9 +109,32 @@ StippleStatus stipple_mesh_add_material(StippleMesh* mesh, const StippleMaterial
       }
       made.texture = given.texture;
     }
+    if (given.view_count != 0) {
+      const uint32_t* textures = &require(given.view_textures, "material->view_textures");
+      made.view_textures.assign(textures, textures + given.view_count);
+      requireViewTextures(*mesh->mesh, made, "material");
+    }
     TriMesh& target = writable(*mesh);
-    target.materials.push_back(made);
+    target.materials.push_back(std::move(made));
     *index = static_cast<uint32_t>(target.materials.size() - 1);
+  });
+}
+
+StippleStatus stipple_mesh_set_view_directions(StippleMesh* mesh, const float* directions,
+                                               uint32_t count) {
+  return guarded([&] {
+    require(mesh, "mesh");
+    require(directions, "directions");
+    if (count == 0 || count > kMaxViewDirections) {
+      fail(ErrorCode::kInvalidArgument,
+           "view direction count is " + std::to_string(count) + "; 1 to 1024 is allowed");
+    }
+    if (!mesh->mesh->view_directions.empty()) {
+      fail(ErrorCode::kInvalidArgument, "the mesh has view directions already");
+    }
+    const std::vector<float> given(directions, directions + size_t{count} * 3);
+    requireViewDirections(given);
+    writable(*mesh).view_directions = given;
   });
 }
 

@@ -45,6 +45,10 @@ void requireTexture(const Image& image, size_t index) {
 void requireMaterial(const TriMesh& mesh, size_t index) {
   const Material& material = mesh.materials[index];
   const std::string name = "mesh: material " + std::to_string(index);
+  requireViewTextures(mesh, material, name);
+  if (!material.view_textures.empty() && mesh.corner_uvs.empty()) {
+    refuse(name + " has view textures, but the mesh has no UV coordinates");
+  }
   requireFinite(material.base_colour, 4, 4, (name + ": base colour").c_str());
   switch (material.colour) {
     case MaterialColour::kConstant:
@@ -91,6 +95,30 @@ bool hasArea(const TriMesh& mesh) {
 
 }  // namespace
 
+void requireViewTextures(const TriMesh& mesh, const Material& material, const std::string& name) {
+  if (material.view_textures.empty()) return;
+  requireCount(material.view_textures.size(), mesh.view_directions.size() / 3,
+               "view textures of a material");
+  for (const uint32_t texture : material.view_textures) {
+    if (texture < mesh.textures.size() && mesh.textures[texture].channels == 3) continue;
+    refuse(name + " has view texture " + std::to_string(texture) + "; one of the " +
+           std::to_string(mesh.textures.size()) + " textures with 3 channels is needed");
+  }
+}
+
+void requireViewDirections(const std::vector<float>& values) {
+  requireCount(values.size(), values.size() / 3 * 3, "view directions");
+  requireFinite(values.data(), values.size(), 3, "mesh: view direction");
+  for (size_t i = 0; i < values.size(); i += 3) {
+    const double length =
+        std::hypot(static_cast<double>(values[i]), static_cast<double>(values[i + 1]),
+                   static_cast<double>(values[i + 2]));
+    if (std::abs(length - 1) <= 1e-3) continue;  // rounding of float32 and of callers
+    refuse("mesh: view direction " + std::to_string(i / 3) + " has a length of " +
+           std::to_string(length) + "; 1 is needed");
+  }
+}
+
 void validateArrays(const TriMesh& mesh) {
   const size_t triangles = mesh.triangleCount();
   const size_t vertices = mesh.vertexCount();
@@ -123,6 +151,7 @@ void validateArrays(const TriMesh& mesh) {
     }
   }
   for (size_t i = 0; i < mesh.textures.size(); ++i) requireTexture(mesh.textures[i], i);
+  requireViewDirections(mesh.view_directions);
   for (size_t i = 0; i < mesh.materials.size(); ++i) requireMaterial(mesh, i);
 }
 

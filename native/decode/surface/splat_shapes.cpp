@@ -43,6 +43,11 @@ struct Moments {
   double opacity = 0;
 };
 
+double weightOfColour(const SurfaceIndex& index, size_t sample) {
+  return static_cast<double>(index.areas[sample]) *
+         (static_cast<double>(index.opacities[sample]) + 1e-4);
+}
+
 /// Sums over the samples of a patch, weighted by area. Colours are weighted by opacity as well, so
 /// that what cannot be seen has no say.
 Moments patchMoments(const SurfaceIndex& index, const SurfacePatches& patches, const float* site,
@@ -56,8 +61,7 @@ Moments patchMoments(const SurfaceIndex& index, const SurfacePatches& patches, c
       d[axis] = static_cast<double>(index.positions[i * 3 + axis] - site[axis]);
       m.mean[axis] += area * d[axis];
       m.normal[axis] += area * static_cast<double>(index.normals[i * 3 + axis]);
-      m.colour[axis] += area * static_cast<double>(index.colours[i * 3 + axis]) *
-                        (static_cast<double>(index.opacities[i]) + 1e-4);
+      m.colour[axis] += weightOfColour(index, i) * static_cast<double>(index.colours[i * 3 + axis]);
     }
     m.second[0] += area * d[0] * d[0];
     m.second[1] += area * d[0] * d[1];
@@ -260,6 +264,37 @@ SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
     }
   });
   return shapes;
+}
+
+std::vector<float> patchHarmonics(const SurfaceIndex& index, const SurfaceSites& sites,
+                                  const SurfacePatches& patches) {
+  const size_t stride = index.harmonic_stride;
+  std::vector<float> means(sites.size() * stride, 0.0f);
+  if (stride == 0) return means;
+  parallelFor(sites.size(), kGrain, [&](size_t first, size_t last) {
+    std::vector<double> sums(stride);
+    for (size_t i = first; i < last; ++i) {
+      float* mean = &means[i * stride];
+      const size_t begin = patches.begins[i], end = patches.begins[i + 1];
+      if (begin == end) {
+        std::copy_n(&index.harmonics[sites.nearest[i] * stride], stride, mean);
+        continue;
+      }
+      std::fill(sums.begin(), sums.end(), 0.0);
+      double total = 0;
+      for (size_t k = begin; k < end; ++k) {
+        const size_t sample = patches.sampleOf(patches.members[k]);
+        const double weight = weightOfColour(index, sample);
+        for (size_t c = 0; c < stride; ++c) {
+          sums[c] += weight * static_cast<double>(index.harmonics[sample * stride + c]);
+        }
+        total += weight;
+      }
+      if (total <= 0) continue;
+      for (size_t c = 0; c < stride; ++c) mean[c] = static_cast<float>(sums[c] / total);
+    }
+  });
+  return means;
 }
 
 }  // namespace stipple

@@ -41,6 +41,10 @@ void centreSites(const SurfaceIndex& index, const SurfacePatches& patches, Surfa
 SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
                       const SurfacePatches& patches);
 
+/// Means [N,harmonic_stride] of the harmonics of each patch, weighted as its colours are.
+std::vector<float> patchHarmonics(const SurfaceIndex& index, const SurfaceSites& sites,
+                                  const SurfacePatches& patches);
+
 /// Finds the borders near each splat, and rounds those that have none: moments of few samples
 /// exaggerate the difference between the axes.
 void findNearBorders(const SurfaceBorders& borders, const SurfaceSites& sites, SplatShapes& shapes);

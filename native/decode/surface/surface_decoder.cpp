@@ -87,15 +87,18 @@ void requireRequest(const DecodeRequest& request) {
   }
 }
 
-SplatCloud cloudOf(const SurfaceIndex& index, const SurfaceSites& sites,
-                   const SplatShapes& shapes) {
+/// harmonics: [N,harmonic_stride] of the patches.
+SplatCloud cloudOf(const SurfaceIndex& index, const SurfaceSites& sites, const SplatShapes& shapes,
+                   const std::vector<float>& harmonics) {
   SplatCloud cloud;
+  cloud.sh_degree = index.harmonic_degree;
   cloud.resize(sites.size());
   // Most splats are about a pixel or smaller. The classic low-pass widens each of them at full
   // opacity, which moves silhouettes outward by a pixel and gets worse with more splats; mip keeps
   // their sum.
   cloud.antialias = Antialias::kMip;
   const auto side = static_cast<float>(index.root.side);
+  const size_t stride = index.harmonic_stride;
   parallelFor(sites.size(), 1024, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const size_t out = sites.outputs[i];
@@ -109,9 +112,11 @@ SplatCloud cloudOf(const SurfaceIndex& index, const SurfaceSites& sites,
             static_cast<float>(index.root.origin[axis] +
                                index.root.side * static_cast<double>(shapes.centres[i * 3 + axis]));
         cloud.scales[out * 3 + axis] = shapes.sigmas[i * 3 + axis] * side;
-        cloud.sh[out * 3 + axis] =
+        cloud.sh[out * (stride + 3) + axis] =
             (linearToSrgb(std::max(0.0f, shapes.colours[i * 3 + axis])) - 0.5f) / kShC0;
       }
+      std::copy_n(harmonics.begin() + static_cast<std::ptrdiff_t>(i * stride), stride,
+                  cloud.sh.begin() + static_cast<std::ptrdiff_t>(out * (stride + 3) + 3));
       cloud.opacities[out] = std::min(0.99f, shapes.opacities[i]);
     }
   });
@@ -146,18 +151,20 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
     sortByCell(index, sites);
   }
   SplatShapes shapes;
+  std::vector<float> harmonics;
   {
     const SurfacePatches patches =
         assignSamples(index, sites, samplesPerSite(sites.size()), request.progress);
     advance(request.progress, 0.4, "Decoding the surface");
     shapes = fitShapes(index, sites, patches);
+    harmonics = patchHarmonics(index, sites, patches);
     findNearBorders(index_->borders, sites, shapes);
     balanceCoverage(index, sites, patches, shapes, request.progress);
   }
   insetSplats(index, sites, shapes);
   sites.cells = std::vector<CellTable>();
   sites.around = std::vector<std::array<uint32_t, 28>>();
-  SplatCloud cloud = cloudOf(index, sites, shapes);
+  SplatCloud cloud = cloudOf(index, sites, shapes, harmonics);
   advance(request.progress, 1.0, "Decoding the surface");
   return cloud;
 }
@@ -182,7 +189,8 @@ uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_p
   const uint64_t splats = anchor_count * gaussians_per_anchor;
   const uint64_t samples =
       surface_->size() / sampleStride(surface_->size(), splats, samplesPerSite(splats));
-  return splats * kSplat + samples * kSample + kFixed;
+  const uint64_t harmonics = surface_->harmonicStride() * sizeof(float);
+  return splats * (kSplat + harmonics) + samples * kSample + kFixed;
 }
 
 }  // namespace stipple

@@ -11,7 +11,8 @@ namespace stipple {
 /// Anchors of a surface density → flat splats on the surface.
 /// Anchors move to the nearest sampled surface of their leaf, lie flat along the normal, and are
 /// sized from the local anchor spacing so that the splats close the surface without growing over
-/// its silhouette. Splats are display-space coloured (kDisplay), harmonic degree 0.
+/// its silhouette. Splats are display-space coloured (kDisplay), of the harmonic degree of
+/// the samples.
 class SurfaceDecoder final : public Decoder {
  public:
   /// In: surface samples in the world; the root cube and leaf level of the density made from them.

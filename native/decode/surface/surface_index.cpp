@@ -92,6 +92,9 @@ SurfaceIndex makeSurfaceIndex(const PointSet& surface, const RootCube& root, int
   index.opacities.resize(count);
   index.areas.resize(count);
   index.spreads.resize(count);
+  index.harmonic_degree = surface.harmonic_degree;
+  index.harmonic_stride = surface.harmonicStride();
+  index.harmonics.resize(count * index.harmonic_stride);
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const size_t from = order[i];
@@ -103,6 +106,10 @@ SurfaceIndex makeSurfaceIndex(const PointSet& surface, const RootCube& root, int
         index.colours[i * 3 + axis] = surface.colours[from * 3 + axis];
       }
       index.opacities[i] = surface.opacities[from];
+      std::copy_n(
+          surface.harmonics.begin() + static_cast<std::ptrdiff_t>(from * index.harmonic_stride),
+          index.harmonic_stride,
+          index.harmonics.begin() + static_cast<std::ptrdiff_t>(i * index.harmonic_stride));
       const double area = static_cast<double>(surface.areas[from]) * area_scale;
       const double weight = static_cast<double>(surface.weights[from]);
       index.areas[i] = static_cast<float>(area);

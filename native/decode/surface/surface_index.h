@@ -22,6 +22,9 @@ struct SurfaceIndex {
   std::vector<float> colours;    ///< [S,3] scene linear
   std::vector<float> opacities;  ///< [S]
   std::vector<float> areas;      ///< [S] unit cube squared
+  std::vector<float> harmonics;  ///< [S,harmonic_stride] of display values, from degree 1 on
+  size_t harmonic_stride = 0;
+  int harmonic_degree = 0;
   /// [S] area of surface per unit of probability: P splats stand sqrt(spread / P) apart here.
   std::vector<float> spreads;
   double area = 0;  ///< of all samples

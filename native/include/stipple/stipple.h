@@ -405,7 +405,9 @@ typedef struct StippleMaterial {
   uint32_t colour;         /* StippleMaterialColour */
   float base_colour[4];    /* scene linear, straight alpha */
   uint32_t texture;        /* index given by stipple_mesh_add_texture, or STIPPLE_NO_INDEX */
-  uint32_t reserved;
+  uint32_t view_count;     /* 0: looks alike from everywhere; else as many as the mesh's view directions */
+  const uint32_t* view_textures; /* [view_count] of 3 channels, at the corner UVs, scene linear, below 0 allowed: what
+                                    comes to the colour when it is seen along each view direction; or NULL */
 } StippleMaterial;
 
 /* Triangles of one object (or one instance of it). */
@@ -441,6 +443,9 @@ StippleStatus stipple_mesh_add_texture(StippleMesh* mesh, uint32_t width, uint32
                                        uint32_t* index);
 StippleStatus stipple_mesh_add_material(StippleMesh* mesh, const StippleMaterial* material,
                                         uint32_t* index);
+/* Directions that the view textures of materials are of: [count,3] unit, from the eye to the surface, world. At most
+ * 1024; given once, before such materials. */
+StippleStatus stipple_mesh_set_view_directions(StippleMesh* mesh, const float* directions, uint32_t count);
 /* Appends a part; any number of parts makes one mesh. Errors: INVALID_ARGUMENT for NaN vertices, vertex or
  * material indices out of range, UVs or colours that a material needs and the part lacks. */
 StippleStatus stipple_mesh_add_part(StippleMesh* mesh, const StippleMeshPart* part);
@@ -647,6 +652,8 @@ typedef struct StippleModelFromMeshOptions {
   uint64_t sample_count;   /* surface samples, 1000..2^26; 0: chosen from the mesh */
   uint64_t seed;
   double detail_weight;    /* >= 0; 0: anchors uniform over the area; default 1 */
+  uint32_t harmonic_degree; /* 0..3, default 3: of the harmonics that show view textures; meshes without have none */
+  uint32_t reserved;
 } StippleModelFromMeshOptions;
 void stipple_model_from_mesh_options_init(StippleModelFromMeshOptions* options);
 

@@ -66,8 +66,26 @@ void validateAsset(const SurfaceAsset& asset, const std::string& name, ErrorCode
   check("opacities", surface.opacities, 1);
   check("areas", surface.areas, 1);
   check("weights", surface.weights, 1);
+  if (surface.harmonic_degree > 0) {
+    check("harmonics", surface.harmonics, surface.harmonicStride());
+  }
   requireNoneNegative(name + ": surface.areas", surface.areas, code);
   requireNoneNegative(name + ": surface.weights", surface.weights, code);
+}
+
+/// Of any degree that sampleSurface gives; files without them have none.
+void readHarmonics(const SafeTensorsReader& file, PointSet& surface) {
+  const auto found = file.tensors().find("surface.harmonics");
+  if (found == file.tensors().end()) return;
+  const uint64_t width = found->second.shape.size() == 2 ? found->second.shape[1] : 0;
+  for (int degree = 1; degree <= kMaxViewDegree; ++degree) {
+    surface.harmonic_degree = degree;
+    if (surface.harmonicStride() != width) continue;
+    surface.harmonics = file.readFloats("surface.harmonics", width);
+    return;
+  }
+  fail(ErrorCode::kFormat, file.path() + ": surface.harmonics has " + std::to_string(width) +
+                               " numbers a sample; 9, 24 or 45 are allowed");
 }
 
 }  // namespace
@@ -86,6 +104,9 @@ void writeSurfaceAsset(const SurfaceAsset& asset, const std::string& path) {
   file.add("surface.opacities", asset.surface.opacities, 1);
   file.add("surface.areas", asset.surface.areas, 1);
   file.add("surface.weights", asset.surface.weights, 1);
+  if (asset.surface.harmonic_degree > 0) {
+    file.add("surface.harmonics", asset.surface.harmonics, asset.surface.harmonicStride());
+  }
   addAssetExtras(file, asset.extras);
   file.write(path);
 }
@@ -101,6 +122,7 @@ SurfaceAsset readSurfaceAsset(const std::string& path) {
   asset.surface.opacities = file.readFloats("surface.opacities", 1);
   asset.surface.areas = file.readFloats("surface.areas", 1);
   asset.surface.weights = file.readFloats("surface.weights", 1);
+  readHarmonics(file, asset.surface);
   asset.settings_json = requireText(file, "settings");
   asset.extras = readAssetExtras(file);
   validateAsset(asset, path, ErrorCode::kFormat);

@@ -11,6 +11,7 @@
 #include "decode/surface/surface_model.h"
 #include "decode/test_meshes.h"
 #include "math/colour.h"
+#include "math/spherical_harmonics.h"
 
 namespace stipple {
 namespace {
@@ -42,6 +43,50 @@ Vec3d position(const SplatCloud& cloud, size_t i) {
   return {static_cast<double>(cloud.positions[i * 3]),
           static_cast<double>(cloud.positions[i * 3 + 1]),
           static_cast<double>(cloud.positions[i * 3 + 2])};
+}
+
+/// Red comes along +x, green along -x, to a grey square that faces up.
+TriMesh shimmeringSquare() {
+  TriMesh mesh;
+  mesh.positions = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+  mesh.triangles = {0, 1, 2, 0, 2, 3};
+  mesh.corner_uvs.assign(12, 0.5f);
+  mesh.view_directions = {0.6f, 0, -0.8f, -0.6f, 0, -0.8f};
+  Image added;
+  added.width = added.height = 1;
+  added.channels = 3;
+  mesh.textures.assign(2, added);
+  mesh.textures[0].pixels = {0.3f, 0, 0};
+  mesh.textures[1].pixels = {0, 0.3f, 0};
+  Material material;
+  for (size_t c = 0; c < 3; ++c) material.base_colour[c] = 0.2f;
+  material.view_textures = {0, 1};
+  mesh.materials = {material};
+  return mesh;
+}
+
+TEST(SurfaceDecoder, GivesSplatsThatChangeWithTheView) {
+  const SplatCloud cloud = decoded(modelOf(shimmeringSquare(), 20000), 500);
+  ASSERT_EQ(cloud.sh_degree, 3);
+  ASSERT_EQ(cloud.sh.size(), cloud.size() * 48);
+  const auto shown = [&](size_t i, const Vec3d& d, size_t channel) {
+    std::array<double, 16> basis;
+    harmonicBasis(3, d.x(), d.y(), d.z(), basis.data());
+    double value = 0.5;
+    for (size_t k = 0; k < 16; ++k) {
+      value += basis[k] * static_cast<double>(cloud.sh[i * 48 + k * 3 + channel]);
+    }
+    return value;
+  };
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    // So few directions do not outweigh what holds coefficients small: it takes a third at most of
+    // the step of 0.25 between them.
+    EXPECT_NEAR(shown(i, Vec3d(0.6, 0, -0.8), 0), linearToSrgb(0.5), 0.08);
+    EXPECT_NEAR(shown(i, Vec3d(0.6, 0, -0.8), 1), linearToSrgb(0.2), 0.08);
+    EXPECT_NEAR(shown(i, Vec3d(-0.6, 0, -0.8), 0), linearToSrgb(0.2), 0.08);
+    EXPECT_NEAR(shown(i, Vec3d(-0.6, 0, -0.8), 1), linearToSrgb(0.5), 0.08);
+    EXPECT_NEAR(shown(i, Vec3d(0, 0, -1), 2), linearToSrgb(0.2), 0.08);
+  }
 }
 
 /// Third axis of a splat: the direction of its thickness.

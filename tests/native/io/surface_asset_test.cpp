@@ -7,6 +7,7 @@
 #include <random>
 #include <string>
 
+#include "base/error.h"
 #include "io/bytes/safetensors.h"
 #include "scratch_folder.h"
 
@@ -57,6 +58,41 @@ SurfaceAsset randomAsset(size_t count, unsigned seed) {
   for (float& weight : asset.surface.weights) weight = std::abs(weight);
   asset.settings_json = "{\"detail\":0.5,\"name\":\"\\u00e4\"}";
   return asset;
+}
+
+TEST_F(SurfaceAssetFile, KeepsHarmonicsOfAnyDegreeAndNoOtherNumberOfThem) {
+  for (int degree = 1; degree <= kMaxViewDegree; ++degree) {
+    SurfaceAsset asset = randomAsset(101, 1);
+    asset.surface.harmonic_degree = degree;
+    asset.surface.harmonics.resize(101 * asset.surface.harmonicStride());
+    for (size_t i = 0; i < asset.surface.harmonics.size(); ++i) {
+      asset.surface.harmonics[i] = static_cast<float>(i) / 7.0f;
+    }
+    writeSurfaceAsset(asset, path("h.stipple.safetensors"));
+    const SurfaceAsset seen = readSurfaceAsset(path("h.stipple.safetensors"));
+    EXPECT_EQ(seen.surface.harmonic_degree, degree);
+    EXPECT_EQ(seen.surface.harmonics, asset.surface.harmonics);
+    asset.surface.harmonics.pop_back();
+    EXPECT_THROW(writeSurfaceAsset(asset, path("h.stipple.safetensors")), Error);
+  }
+  const SurfaceAsset asset = randomAsset(8, 1);
+  writeSurfaceAsset(asset, path("h.stipple.safetensors"));
+  SafeTensorsWriter odd;
+  const SafeTensorsReader whole(path("h.stipple.safetensors"));
+  for (const auto& [key, value] : whole.metadata()) odd.setMetadata(key, value);
+  const auto tensors = whole.readOthers();
+  for (const auto& [name, tensor] : tensors) odd.carry(name, tensor);
+  const std::vector<float> ten(80, 0.5f);
+  odd.add("surface.harmonics", ten, 10);
+  odd.write(path("odd.stipple.safetensors"));
+  try {
+    readSurfaceAsset(path("odd.stipple.safetensors"));
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("has 10 numbers a sample; 9, 24 or 45"),
+              std::string::npos)
+        << error.what();
+  }
 }
 
 TEST_F(SurfaceAssetFile, GivesEverythingBackBitForBit) {

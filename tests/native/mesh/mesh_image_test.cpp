@@ -115,6 +115,27 @@ TEST(MeshImage, LooksTexturesUpAtTheirPlace) {
   }
 }
 
+TEST(MeshImage, ShowsWhatComesAlongTheCamera) {
+  TriMesh mesh;
+  Material shining = plain(0.1f, 0.1f, 0.1f);
+  shining.view_textures = {0, 1, 1, 1, 1, 1};
+  addQuad(mesh, -6, 6, -6, 6, 0, shining);
+  mesh.corner_uvs.assign(12, 0.5f);
+  // Down is what the camera looks along; the others are at right angles to it or come from behind.
+  mesh.view_directions = {0, 0, -1, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1};
+  Image added;
+  added.width = added.height = 1;
+  added.channels = 3;
+  added.pixels = {0.3f, 0, -0.4f};
+  mesh.textures = {added, added};
+  mesh.textures[1].pixels = {100, 100, 100};
+  const std::vector<float> rgba = drawn(mesh, 1);
+  // exp(-6) of the nearest direction's weight is below what counts; less than nothing is black.
+  EXPECT_NEAR(pixel(rgba, 5, 5)[0], linearToSrgb(0.4), 1e-6);
+  EXPECT_NEAR(pixel(rgba, 5, 5)[1], linearToSrgb(0.1), 1e-6);
+  EXPECT_EQ(pixel(rgba, 5, 5)[2], 0.0f);
+}
+
 TEST(MeshImage, LetsAShareOfTheRaysThrough) {
   TriMesh mesh;
   addQuad(mesh, -6, 6, -6, 6, 0, plain(1, 1, 1));

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "math/colour.h"
+#include "math/spherical_harmonics.h"
 
 namespace stipple {
 namespace {
@@ -303,6 +304,87 @@ TEST(SurfaceSampling, DependsOnTheSeedAndNotOnTheThreads) {
   EXPECT_EQ(one.positions, two.positions);
   EXPECT_EQ(one.weights, two.weights);
   EXPECT_NE(sampled(mesh, 30000, 1.0, 8).positions, one.positions);
+}
+
+/// A dark square that shines white along one of six directions, and a plain one beside it.
+TriMesh shiningSquare() {
+  TriMesh mesh = rectangle(1, 1);
+  mesh.positions.insert(mesh.positions.end(), {2, 0, 0, 3, 0, 0, 3, 1, 0, 2, 1, 0});
+  mesh.triangles.insert(mesh.triangles.end(), {4, 5, 6, 4, 6, 7});
+  addRectangleUvs(mesh);
+  mesh.corner_uvs.insert(mesh.corner_uvs.end(), 12, 0.0f);
+  mesh.triangle_materials = {0, 0, 1, 1};
+  mesh.materials.assign(2, Material());
+  mesh.view_directions = {1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0.6f, 0, -0.8f};
+  Image dark;
+  dark.width = dark.height = 1;
+  dark.channels = 3;
+  dark.pixels = {0, 0, 0};
+  Image bright = dark;
+  bright.pixels = {0.6f, 0.6f, 0.6f};
+  mesh.textures = {dark, bright};
+  for (float& value : mesh.materials[0].base_colour) value = 0.1f;
+  mesh.materials[0].base_colour[3] = 1;
+  mesh.materials[0].view_textures = {0, 0, 0, 0, 0, 1};
+  return mesh;
+}
+
+TEST(SurfaceSampling, ShowsWhatComesToItFromViewDirections) {
+  SurfaceSamplingOptions options;
+  options.count = 1000;
+  options.detail_count = 1000;
+  options.harmonic_degree = 2;
+  const PointSet set = sampleSurface(shiningSquare(), options);
+  ASSERT_EQ(set.harmonic_degree, 2);
+  ASSERT_EQ(set.harmonics.size(), set.size() * 24);
+  const auto shown = [&](size_t i, const Vec3d& d) {
+    std::array<double, 9> basis;
+    harmonicBasis(2, d.x(), d.y(), d.z(), basis.data());
+    double value = linearToSrgb(static_cast<double>(set.colours[i * 3]));
+    for (size_t k = 1; k < 9; ++k) {
+      value += basis[k] * static_cast<double>(set.harmonics[(i * 8 + k - 1) * 3]);
+    }
+    return value;
+  };
+  for (size_t i = 0; i < set.size(); ++i) {
+    const bool is_plain = set.positions[i * 3] > 1.5f;
+    // So few directions do not outweigh what holds coefficients small: it takes a quarter at most
+    // of the step of 0.5 between the two.
+    EXPECT_NEAR(shown(i, Vec3d(0, 0, -1)), linearToSrgb(is_plain ? 0.8 : 0.1), 0.125);
+    EXPECT_NEAR(shown(i, Vec3d(0.6, 0, -0.8)), linearToSrgb(is_plain ? 0.8 : 0.7), 0.125);
+    if (is_plain) {
+      EXPECT_EQ(set.colours[i * 3], 0.8f);
+    }
+  }
+  options.harmonic_degree = 0;
+  const PointSet still = sampleSurface(shiningSquare(), options);
+  EXPECT_TRUE(still.harmonics.empty());
+  EXPECT_EQ(still.harmonicStride(), 0u);
+  options.harmonic_degree = 4;
+  EXPECT_THROW(sampleSurface(shiningSquare(), options), Error);
+}
+
+TEST(SurfaceSampling, RefusesViewTexturesThatDoNotFit) {
+  const auto refusal = [](const TriMesh& mesh) -> std::string {
+    try {
+      sampled(mesh, 10);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  TriMesh mesh = shiningSquare();
+  mesh.materials[0].view_textures.pop_back();
+  EXPECT_THAT(refusal(mesh), HasSubstr("view textures of a material holds 5 values; 6 are needed"));
+  mesh = shiningSquare();
+  mesh.materials[0].view_textures[2] = 9;
+  EXPECT_THAT(refusal(mesh), HasSubstr("view texture 9"));
+  mesh = shiningSquare();
+  mesh.view_directions[0] = 2;
+  EXPECT_THAT(refusal(mesh), HasSubstr("view direction 0 has a length of 2"));
+  mesh = shiningSquare();
+  mesh.corner_uvs.clear();
+  EXPECT_THAT(refusal(mesh), HasSubstr("view textures, but the mesh has no UV"));
 }
 
 TEST(SurfaceSampling, RefusesBadOptionsAndMeshes) {

@@ -475,6 +475,7 @@ def attach_model(data, path, objects, settings):
     stipple.source_detail_weight = stipple.detail_weight
     stipple.source_color_from = stipple.color_from
     stipple.source_bake = (stipple.bake_size, stipple.bake_samples)
+    stipple.source_bake_views = stipple.bake_views
     stipple.is_sequence = False
     stipple.source_objects.clear()
     for obj in objects:
