@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits one data set with OpenSplat and with Stipple, for as many iterations, and prints time and held-out PSNR.
+"""Fits one data set with OpenSplat and with Stipple, for as many iterations, and prints time and held-out PSNR and SSIM.
 
     compare_fits.py OPENSPLAT STIPPLE DATASET [ITERATIONS ...]
 
@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from make_scene import Context, Image, library
+from stipple.binding.gradients import image_loss
 
 HOLDOUT = 8
 ITERATIONS = (200, 500)
@@ -60,16 +61,17 @@ def pixels(context, path):
 
 
 def judge(stipple, context, splats, held_out, folder):
-    """Mean PSNR over the held-out views, dB."""
+    """Mean PSNR over the held-out views, dB, and mean SSIM."""
     frames = json.loads((held_out / 'transforms.json').read_text())['frames']
-    values = []
+    psnr, ssim = [], []
     for view, frame in enumerate(frames):
         picture = folder / 'picture.png'
         run(stipple, 'render', splats, '--camera', held_out / 'transforms.json', '--view', view, '--background',
             '0', '0', '0', '-o', picture)
-        error = pixels(context, picture) - pixels(context, held_out / frame['file_path'])
-        values.append(-10 * math.log10(np.mean(error.astype(np.float64) ** 2)))
-    return sum(values) / len(values)
+        drawn, photo = pixels(context, picture), pixels(context, held_out / frame['file_path'])
+        psnr.append(-10 * math.log10(np.mean((drawn - photo).astype(np.float64) ** 2)))
+        ssim.append(image_loss(context, drawn, photo, with_gradient=False)[2])
+    return np.mean(psnr), np.mean(ssim)
 
 
 def fit_peer(program, training, iterations, result):
@@ -92,7 +94,7 @@ def main():
     dataset = Path(dataset)
     counts = sorted(int(count) for count in counts) or ITERATIONS
     context = Context(library.load(Path(stipple).resolve().parents[1] / 'lib' / 'libstipple.so'))
-    seconds, psnr = {}, {}
+    seconds, psnr, ssim = {}, {}, {}
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         training, held_out = split(dataset, folder)
@@ -104,11 +106,12 @@ def main():
             for count in counts:
                 result = folder / f'{name}_{count}.ply'
                 seconds[name, count] = fit(count, result)
-                psnr[name, count] = judge(stipple, context, result, held_out, folder)
+                psnr[name, count], ssim[name, count] = judge(stipple, context, result, held_out, folder)
                 if name == 'OpenSplat':
                     most[count] = splat_count(result)
                 print(f'{name:9} {count:5} iterations: {seconds[name, count]:7.1f} s, held out '
-                      f'{psnr[name, count]:.2f} dB, {splat_count(result)} splats', flush=True)
+                      f'{psnr[name, count]:.2f} dB, SSIM {ssim[name, count]:.4f}, {splat_count(result)} splats',
+                      flush=True)
     if len(counts) > 1:
         step = {name: (seconds[name, counts[-1]] - seconds[name, counts[0]]) / (counts[-1] - counts[0])
                 for name in fits}
