@@ -1,7 +1,10 @@
 #include "api/guard.h"
 #include "api/handles.h"
+#include "api/job.h"
 #include "data/images/image_comparison.h"
+#include "io/assets/weight_file.h"
 #include "io/image_file.h"
+#include "measure/perceptual_distance.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -84,6 +87,26 @@ StippleStatus stipple_image_compare(const StippleImage* a, const StippleImage* b
     out.max_error = made.max_error;
     out.mean_error = made.mean_error;
     deliver(result, out, "result");
+  });
+}
+
+StippleStatus stipple_image_lpips_start(const StippleImage* a, const StippleImage* b,
+                                        const char* weights_utf8, double* distance,
+                                        StippleJob** job) {
+  return guarded([&] {
+    const std::shared_ptr<const Image> first = require(a, "a").image;
+    const std::shared_ptr<const Image> second = require(b, "b").image;
+    const std::string path = &require(weights_utf8, "weights_utf8");
+    require(distance, "distance");
+    require(job, "job");
+    const Context context = a->context;
+    const PerceptualDistance measure(openWeightFile(path));
+    context->requireMemory(measure.memoryBound(first->pixelCount()), "LPIPS of the images");
+    *job = startJob(context, [measure, first, second, distance](Progress& progress) {
+      const NetworkRun run = {.progress = &progress};
+      *distance = measure.between(run, *first, *second);
+      return JobResult{};
+    });
   });
 }
 

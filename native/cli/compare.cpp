@@ -7,7 +7,9 @@ namespace stipple::cli {
 
 namespace {
 
-Report compareImages(const Context& context, const std::string& a, const std::string& b) {
+/// weights: a file with LPIPS's, empty for none.
+Report compareImages(const Context& context, const std::string& a, const std::string& b,
+                     const std::string& weights) {
   const auto first = make<Image>(stipple_image_load, context.get(), a.c_str());
   const auto second = make<Image>(stipple_image_load, context.get(), b.c_str());
   auto result = sized<StippleImageComparison>();
@@ -17,6 +19,13 @@ Report compareImages(const Context& context, const std::string& a, const std::st
   report.add("ssim", result.ssim);
   report.add("max_error", result.max_error);
   report.add("mean_error", result.mean_error);
+  if (!weights.empty()) {
+    double distance = 0;
+    const auto job =
+        make<Job>(stipple_image_lpips_start, first.get(), second.get(), weights.c_str(), &distance);
+    finish(job);
+    report.add("lpips", distance);
+  }
   return report;
 }
 
@@ -46,7 +55,7 @@ Report compareClouds(const Context& context, const std::string& a, const std::st
 
 void addCompare(CLI::App& app, const Context& context) {
   struct Arguments {
-    std::string a, b;
+    std::string a, b, lpips;
     bool json = false;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -54,6 +63,8 @@ void addCompare(CLI::App& app, const Context& context) {
       "compare", "PSNR, SSIM and largest error of two images, or differences of two clouds");
   command->add_option("a", arguments->a, "Image or splat file")->required();
   command->add_option("b", arguments->b, "Image or splat file of the same kind")->required();
+  command->add_option("--lpips", arguments->lpips,
+                      "File with the weights of LPIPS, for images (docs/methods/lpips.md)");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([arguments, &context] {
     const FileKind kind = fileKind(arguments->a);
@@ -61,8 +72,11 @@ void addCompare(CLI::App& app, const Context& context) {
       throw Failure("'" + arguments->a + "' and '" + arguments->b +
                     "' cannot be compared; two images or two splat files are expected");
     }
+    if (kind != FileKind::kImage && !arguments->lpips.empty()) {
+      throw Failure("--lpips compares images; '" + arguments->a + "' holds splats");
+    }
     const Report report = kind == FileKind::kImage
-                              ? compareImages(context, arguments->a, arguments->b)
+                              ? compareImages(context, arguments->a, arguments->b, arguments->lpips)
                               : compareClouds(context, arguments->a, arguments->b);
     report.print(arguments->json);
   });

@@ -41,6 +41,9 @@ class Convolution {
 
   size_t inputs() const { return inputs_; }
   size_t outputs() const { return outputs_; }
+  size_t stride() const { return grid_.stride; }
+  /// How many pixels come out along a side of so many, 0 where there are too few.
+  size_t outputSide(size_t side) const { return grid_.outputs(side); }
   /// Multiplications and additions for a map of that size.
   double flops(size_t height, size_t width) const;
   /// The map that comes out of one of that size, not initialised. Errors: kInvalidArgument where

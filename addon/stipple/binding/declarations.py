@@ -299,6 +299,7 @@ FUNCTIONS = {
     'stipple_image_info': (_status, [_handle, _to(s.StippleImageInfo)]),
     'stipple_image_read': (_status, [_handle, _floats, c_uint64]),
     'stipple_image_save': (_status, [_handle, _path, c_uint32]),
+    'stipple_image_lpips_start': (_status, [_handle, _handle, c_char_p, POINTER(c_double), _out_handle]),
     'stipple_image_compare': (_status, [_handle, _handle, _to(s.StippleImageComparison)]),
     'stipple_image_channels_load': (_status, [_handle, _path, _out_handle]),
     'stipple_image_channels_free': (None, [_handle]),

@@ -2415,6 +2415,12 @@ StippleStatus stipple_image_save(const StippleImage* image, const char* path_utf
 /* Compares two images of the same size and channels in display space. */
 StippleStatus stipple_image_compare(const StippleImage* a, const StippleImage* b,
                                     StippleImageComparison* result);
+/* LPIPS of two images of the same size, as a job: 0 where equal, more where people see more difference. weights_utf8: a
+ * safetensors file with the state of the authors' module, of AlexNet or VGG16 (docs/methods/lpips.md); nothing is shipped.
+ * Alpha is over black. *distance is written when the job is done and must live until then. Errors: IO and FORMAT for
+ * the file; INVALID_ARGUMENT for images of different sizes or too small ones; OUT_OF_MEMORY; CANCELLED. */
+StippleStatus stipple_image_lpips_start(const StippleImage* a, const StippleImage* b, const char* weights_utf8,
+                                        double* distance, StippleJob** job);
 
 typedef struct StippleImageChannelInfo {
   uint32_t struct_size;
