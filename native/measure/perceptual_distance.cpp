@@ -136,6 +136,22 @@ bool PerceptualDistance::fits(size_t side) const {
   return true;
 }
 
+double PerceptualDistance::flops(size_t height, size_t width) const {
+  double sum = 0;
+  for (const Stage& stage : stages_) {
+    if (stage.pool > 0) {
+      height = pooledSize(height, stage.pool);
+      width = pooledSize(width, stage.pool);
+    }
+    for (const Convolution& convolution : stage.convolutions) {
+      sum += convolution.flops(height, width);
+      height = convolution.outputSide(height);
+      width = convolution.outputSide(width);
+    }
+  }
+  return sum;
+}
+
 uint32_t PerceptualDistance::leastSide() const {
   uint32_t side = 1;
   while (!fits(side)) ++side;

@@ -26,6 +26,8 @@ class PerceptualDistance {
   double between(const NetworkRun& run, const Image& a, const Image& b) const;
   /// Pixels that an image needs along each side.
   uint32_t leastSide() const;
+  /// Multiplications and additions of the convolutions for one image.
+  double flops(size_t height, size_t width) const;
   /// Bytes that between() allocates at most.
   uint64_t memoryBound(uint64_t pixel_count) const;
 
