@@ -27,9 +27,10 @@ namespace {
 
 /// Weights of growth by level at the begin of a segment; they rise to 1 at its end.
 constexpr std::array<double, 3> kLevelWeights = {1, 0.5, 0.25};
-/// Of a window, the share of steps that draw fewer anchors. It has a few hundred steps, and what
-/// smaller budgets ask for was learned by the global anchors.
-constexpr double kBudgetShare = 0.25;
+/// Of the second half of a window, the share of steps that draw fewer anchors. It has a few hundred
+/// steps, all of which motion asks for, and what smaller budgets ask for was learned by the global
+/// anchors (docs/methods/relay.md).
+constexpr double kBudgetShare = 0.1;
 /// Of a window, the share of the rates of anchors: they are what the key frame has made them, and
 /// begin without moments.
 constexpr double kWindowRates = 0.3;
