@@ -20,6 +20,8 @@ int run(int argc, char** argv) {
   }
   CLI::App app("Stipple: density-controlled Gaussian splats", "stipple");
   app.require_subcommand(1);
+  // Options begin with dashes on every system: on Windows CLI11 takes a word with a slash for one.
+  app.allow_windows_style_options(false);
   app.set_version_flag("--version", stipple_version_string());
   Context context;
   uint32_t threads = 0;

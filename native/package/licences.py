@@ -44,8 +44,6 @@ FROM_PACKAGES = {
     'stb': ('libstb-dev', 'stb: outlines of letters'),
     'gcc': ('libstdc++-12-dev', "GCC's libstdc++ and libgcc, under the GCC Runtime Library Exception"),
 }
-# What the package for Windows holds of both, without what reads and writes images, meshes, volumes and packed splats.
-IN_WINDOWS = ('tbb', 'hwy', 'eigen', 'nanoflann', 'nlohmann-json', 'stb', 'gcc')
 # On Windows also what stands between the compiler and the system.
 FOR_WINDOWS = {
     'mingw-w64': ('mingw-w64-x86-64-dev', 'mingw-w64: the start of programs, functions of C99, threads of POSIX'),
@@ -71,12 +69,10 @@ def gather(parts, output, platform):
     output.mkdir(parents=True)
     index = {}
     is_windows = platform.startswith('windows')
-    compiled, packages = ({name: what for name, what in table.items() if not is_windows or name in IN_WINDOWS}
-                          for table in (COMPILED, FROM_PACKAGES))
-    for folder, about in compiled.values():
+    for folder, about in COMPILED.values():
         shutil.copyfile(licence_of_source(parts / 'source' / folder), output / f'{folder}.txt')
         index[f'{folder}.txt'] = about
-    for name, (package, about) in (packages | (FOR_WINDOWS if is_windows else {})).items():
+    for name, (package, about) in (FROM_PACKAGES | (FOR_WINDOWS if is_windows else {})).items():
         shutil.copyfile(DOCS / package / 'copyright', output / f'{name}.txt')
         index[f'{name}.txt'] = about
     if not is_windows:

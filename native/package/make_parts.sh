@@ -11,12 +11,9 @@ jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
 python=/usr/bin/python3
 parts=$folder
 cross=()
-targets=()
 if [ "${1:-}" = --windows ]; then
   parts=$folder/windows
   cross=(-DCMAKE_TOOLCHAIN_FILE="$PWD/native/package/windows.cmake")
-  # What reads and writes images, meshes, volumes and packed splats is not in that package yet (docs/packages.md).
-  targets=(--target part_tbb part_hwy)
 fi
 
 # The mirror that this machine's packages come from.
@@ -27,26 +24,24 @@ if [ ${#cross[@]} -eq 0 ]; then
 fi
 cmake -S native/package/parts -B "$parts/parts" -G Ninja -DCMAKE_BUILD_TYPE=Release "${cross[@]}" \
   -DSTIPPLE_SOURCES="$folder/source" -DSTIPPLE_PARTS="$parts" >/dev/null
-cmake --build "$parts/parts" --parallel "$jobs" "${targets[@]}"
-if [ ${#cross[@]} -ne 0 ]; then
-  exit 0
-fi
+cmake --build "$parts/parts" --parallel "$jobs"
 
 # own_build NAME OPTION...: libraries that only their own build can make.
 own_build() {
   local name=$1
   shift
   if [ ! -e "$parts/$name/made" ]; then
-    cmake -S "$parts/source/$name" -B "$parts/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_SHARED_LIBS=OFF \
-      -DBUILD_TESTING=OFF -DCMAKE_POSITION_INDEPENDENT_CODE=ON -DCMAKE_INSTALL_PREFIX="$parts" \
-      -DCMAKE_INSTALL_LIBDIR="$parts/lib" -DCMAKE_PREFIX_PATH="$parts" -DZLIB_INCLUDE_DIR="$parts/source/zlib" \
-      -DZLIB_LIBRARY="$parts/lib/libz.a" "${launcher[@]}" \
-      "-DCMAKE_C_FLAGS=-fexceptions $maps" "-DCMAKE_CXX_FLAGS=$maps" "$@" >"$parts/$name.log"
+    # Flags come by the environment, so that those of the toolchain are added to them.
+    CFLAGS="-fexceptions $maps" CXXFLAGS=$maps cmake -S "$folder/source/$name" -B "$parts/$name" -G Ninja \
+      -DCMAKE_BUILD_TYPE=Release "${cross[@]}" -DBUILD_SHARED_LIBS=OFF -DBUILD_TESTING=OFF \
+      -DCMAKE_POSITION_INDEPENDENT_CODE=ON -DCMAKE_INSTALL_PREFIX="$parts" -DCMAKE_INSTALL_LIBDIR="$parts/lib" \
+      -DCMAKE_PREFIX_PATH="$parts" -DZLIB_INCLUDE_DIR="$folder/source/zlib" -DZLIB_LIBRARY="$parts/lib/libz.a" \
+      "${launcher[@]}" "$@" >"$parts/$name.log"
     cmake --build "$parts/$name" --parallel "$jobs" --target install >>"$parts/$name.log"
     touch "$parts/$name/made"
   fi
 }
-maps="-ffile-prefix-map=$parts=parts"
+maps="-ffile-prefix-map=$folder=parts"
 launcher=()
 if command -v ccache >/dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)

@@ -17,7 +17,7 @@ for option; do
   case $option in
     --windows)
       parts=$folder/windows preset=windows libraries=bin platform=windows-x64 dependencies=--windows
-      parts_option=(--windows) targets=(stipple)
+      parts_option=(--windows) targets=(stipple stipple_tool)
       ;;
     --twice) twice=yes ;;
     *) echo "make_release.sh: the option is '$option'; --windows and --twice are known." >&2; exit 1 ;;

@@ -6,6 +6,10 @@ function(stipple_media_parts TARGET)
     ${STIPPLE_PACKAGE_PARTS}/include ${STIPPLE_PACKAGE_PARTS}/include/openvdb ${STIPPLE_PACKAGE_PARTS}/include/Imath
     ${STIPPLE_PACKAGE_PARTS}/include/OpenEXR
     ${sources}/openvdb/openvdb ${sources}/tinygltf ${sources}/png ${sources}/webp/src ${sources}/zlib ${sources}/zstd/lib)
+  if(WIN32)
+    # Without them OpenVDB's headers look for it, and for OpenEXR, in a .dll.
+    target_compile_definitions(${TARGET} PRIVATE OPENVDB_STATICLIB OPENVDB_OPENEXR_STATICLIB)
+  endif()
 endfunction()
 # The libraries behind them, each before those that it calls.
 set(STIPPLE_MEDIA_LIBRARIES openvdb blosc lz4 zstd tinygltf png jpeg webp

@@ -1,6 +1,6 @@
 # What the Windows package is put together from: the static libraries and the headers in STIPPLE_PACKAGE_PARTS, which
 # `native/package/make_parts.sh --windows` makes with the toolchain windows.cmake.
-foreach(file lib/libtbb.a lib/libhwy.a include/tbb/parallel_for.h)
+foreach(file lib/libtbb.a lib/libhwy.a lib/libOpenEXR-3_1.a include/tbb/parallel_for.h)
   if(NOT EXISTS ${STIPPLE_PACKAGE_PARTS}/${file})
     message(FATAL_ERROR "${STIPPLE_PACKAGE_PARTS}/${file} is missing; run native/package/make_parts.sh --windows")
   endif()

@@ -63,6 +63,18 @@ def windows_library(windows_zip, tmp_path_factory):
 
 
 @pytest.fixture(scope='session')
+def windows_tool(windows_library, tmp_path_factory):
+    """stipple.exe, as it is built beside the zip's library, and that library, in a folder with letters of any kind."""
+    built = ROOT / 'build' / 'windows' / 'bin' / 'stipple.exe'
+    assert built.is_file(), f'{built} is missing; bash native/package/make_release.sh --windows makes it'
+    folder = tmp_path_factory.mktemp('exe') / 'Programme für 日本'
+    folder.mkdir()
+    for file in (built, windows_library):
+        shutil.copy(file, folder)
+    return folder / built.name
+
+
+@pytest.fixture(scope='session')
 def wine(tmp_path_factory):
     """run(program, arguments..., cwd=...): a program of Windows under Wine; returns what it printed and its status."""
     launcher = shutil.which('wine')
@@ -75,7 +87,7 @@ def wine(tmp_path_factory):
     def run(program, *arguments, cwd=None, debug='-all'):
         return subprocess.run([launcher, program, *map(str, arguments)], cwd=cwd, env=environment | {'WINEDEBUG': debug},
                               capture_output=True, text=True, timeout=600, errors='replace')
-    run.environment = environment
+    run.environment, run.launcher = environment, launcher
     subprocess.run([launcher, 'wineboot', '--init'], env=environment, capture_output=True, timeout=300, check=True)
     yield run
     server = shutil.which('wineserver') or '/usr/lib/wine/wineserver'
@@ -90,3 +102,12 @@ def linux_library():
         if file.is_file():
             return file
     pytest.skip('there is no build for Linux in build/portable or build/release to compare with')
+
+
+@pytest.fixture(scope='session')
+def linux_tool(linux_library):
+    """The tool of the same build."""
+    file = linux_library.parent.parent / 'bin' / 'stipple'
+    if not file.is_file():
+        pytest.skip(f'{file} is not built, which the tool for Windows is compared with')
+    return file

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Loads the library by its path, as the add-on's binding does, and makes the calls that the add-on
- * makes of it: reads splats, makes a model of them, decodes it at a budget, renders, writes.
- * test_windows.py compiles it for Linux and for Windows and compares what comes out.
+ * makes of it: reads splats, makes a model of them, decodes it at a budget, renders, fills a
+ * volume, writes. test_windows.py compiles it for Linux and for Windows and compares what comes
+ * out.
  *
  *     library_driver LIBRARY FOLDER PIXELS
  */
@@ -136,19 +137,74 @@ static StippleCloud* refined(const StippleCloud* cloud, const StippleCloud* full
   return result;
 }
 
-static void render(StippleContext* context, const StippleCloud* cloud, const char* cameras,
-                   const char* path) {
-  StippleViews* views = NULL;
-  check(CALL(stipple_views_load)(context, cameras, &views));
-  StippleCamera camera;
-  memset(&camera, 0, sizeof(camera));
-  camera.struct_size = sizeof(camera);
-  check(CALL(stipple_views_camera)(views, 0, &camera));
+/* The splats where they are. */
+static StippleInstance whole(const StippleCloud* cloud) {
   StippleInstance instance;
   memset(&instance, 0, sizeof(instance));
   instance.struct_size = sizeof(instance);
   instance.cloud = cloud;
   for (int i = 0; i < 4; ++i) instance.matrix[i * 5] = 1;
+  return instance;
+}
+
+/* The pixels as PNG and as EXR, of which the second keeps every bit. */
+static void writePictures(StippleContext* context, uint32_t width, uint32_t height,
+                          const float* pixels, const char* folder) {
+  StippleImage* image = NULL;
+  check(CALL(stipple_image_create)(context, width, height, 4, STIPPLE_TRANSFER_LINEAR, pixels,
+                                   &image));
+  check(CALL(stipple_image_save)(image, inside(folder, "picture.png"), 0));
+  check(CALL(stipple_image_save)(image, inside(folder, "picture.exr"), 0));
+  CALL(stipple_image_free)(image);
+  check(CALL(stipple_image_load)(context, inside(folder, "picture.exr"), &image));
+  const size_t count = (size_t)width * height * 4;
+  float* read = malloc(count * sizeof(float));
+  check(CALL(stipple_image_read)(image, read, count));
+  if (memcmp(read, pixels, count * sizeof(float)) != 0) {
+    fprintf(stderr, "picture.exr holds other pixels than were written\n");
+    exit(1);
+  }
+  free(read);
+  CALL(stipple_image_free)(image);
+}
+
+/* A volume of the splats, which is written and read again. */
+static void writeVolumes(StippleContext* context, const StippleCloud* cloud, const char* folder) {
+  StippleInstance instance = whole(cloud);
+  StippleVoxelizeOptions options;
+  CALL(stipple_voxelize_options_init)(&options);
+  options.resolution = 24;
+  StippleJob* job = NULL;
+  check(CALL(stipple_voxelize_start)(context, &instance, 1, &options, &job));
+  finish(job);
+  StippleVolume* volume = NULL;
+  check(CALL(stipple_job_volume)(job, &volume));
+  CALL(stipple_job_free)(job);
+  StippleVolumeInfo first, second;
+  memset(&first, 0, sizeof(first));
+  first.struct_size = sizeof(first);
+  second = first;
+  check(CALL(stipple_volume_info)(volume, &first));
+  check(CALL(stipple_volume_save)(volume, inside(folder, "volume.vdb")));
+  CALL(stipple_volume_free)(volume);
+  check(CALL(stipple_volume_load)(context, inside(folder, "volume.vdb"), &volume));
+  check(CALL(stipple_volume_info)(volume, &second));
+  CALL(stipple_volume_free)(volume);
+  if (first.active_voxel_count < 100 || first.active_voxel_count != second.active_voxel_count) {
+    fprintf(stderr, "volume.vdb holds other voxels than were written\n");
+    exit(1);
+  }
+}
+
+static void render(StippleContext* context, const StippleCloud* cloud, const char* folder,
+                   const char* path) {
+  StippleViews* views = NULL;
+  check(CALL(stipple_views_load)(context, inside(folder, "transforms.json"), &views));
+  StippleCamera camera;
+  memset(&camera, 0, sizeof(camera));
+  camera.struct_size = sizeof(camera);
+  check(CALL(stipple_views_camera)(views, 0, &camera));
+  StippleInstance instance = whole(cloud);
   StippleRenderOptions options;
   CALL(stipple_render_options_init)(&options);
   StippleRenderBuffers buffers;
@@ -165,6 +221,7 @@ static void render(StippleContext* context, const StippleCloud* cloud, const cha
   FILE* file = fopen(path, "wb");
   fwrite(buffers.colour, sizeof(float), count, file);
   fclose(file);
+  writePictures(context, camera.width, camera.height, buffers.colour, folder);
   free(buffers.colour);
   CALL(stipple_job_free)(job);
   CALL(stipple_renderer_free)(renderer);
@@ -192,18 +249,23 @@ int main(int argc, char** argv) {
   save(part, folder, "part.compressed.ply");
   save(part, folder, "part.usda");
   save(part, folder, "part.glb");
+  save(part, folder, "part.spz");
+  save(part, folder, "part.sog");
+  save(part, folder, "part.usdz");
   StippleCloud* again = NULL;
-  check(CALL(stipple_cloud_load)(context, inside(folder, "part.usda"), &again));
+  check(CALL(stipple_cloud_load)(context, inside(folder, "part.spz"), &again));
   save(again, folder, "again.ply");
   StippleCloud* fitted = refined(part, full);
   save(fitted, folder, "fitted.ply");
-  render(context, part, inside(folder, "transforms.json"), words[3]);
+  render(context, part, folder, words[3]);
+  writeVolumes(context, part, folder);
 
   /* Errors are sentences that name the file, in UTF-8. */
   StippleCloud* none = NULL;
   sayError(CALL(stipple_cloud_load)(context, "nicht da \xc3\xa4.ply", &none));
   sayError(CALL(stipple_cloud_save)(part, inside(folder, "read only.ply"), NULL));
-  sayError(CALL(stipple_cloud_save)(part, inside(folder, "part.spz"), NULL));
+  StippleImage* image = NULL;
+  sayError(CALL(stipple_image_load)(context, inside(folder, "truth.ply"), &image));
 
   CALL(stipple_cloud_free)(fitted);
   CALL(stipple_cloud_free)(again);

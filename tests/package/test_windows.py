@@ -11,6 +11,7 @@ import zipfile
 from pathlib import Path
 
 import bare_systems
+import licences
 import numpy as np
 import pytest
 import rules
@@ -23,14 +24,14 @@ SYSTEM = {'KERNEL32.dll', 'msvcrt.dll', 'ADVAPI32.dll', 'SHELL32.dll', 'USER32.d
 HEADER = 'native/include/stipple/stipple.h'
 # What library_driver.c writes.
 IDENTICAL = ('model.stipple.safetensors', 'part.ply', 'part.splat', 'part.compressed.ply', 'part.usda', 'part.glb',
-             'again.ply')
+             'part.spz', 'part.sog', 'part.usdz', 'again.ply')
 # Functions of the C library round otherwise: a pixel by its last bit, and a fit by what 20 steps make of that.
 PIXEL_ROUNDING = 1e-6
 FIT_ROUNDING = 1e-3
 SAID = ["STIPPLE_ERROR_IO: nicht da ä.ply cannot be opened: No such file or directory",
         "STIPPLE_ERROR_IO: {}/read only.ply cannot be written: Permission denied",
-        "STIPPLE_ERROR_UNAVAILABLE: stipple_media.dll, which reads and writes images, meshes, volumes and packed splats, "
-        "cannot be loaded: Module not found"]
+        "STIPPLE_ERROR_FORMAT: {}/truth.ply is not an image that can be read: this build reads PNG, JPEG, WebP and "
+        "OpenEXR"]
 FOLDERS = {'plain': ('work',), 'letters': ('Größe und Maß', 'Пример 日本語 🙂'), 'long': ('tief ' + 'ä' * 90,) * 4}
 # What Wine prints of the names that it is asked for, and how one begins that may be longer than 260 letters.
 ASKED = re.compile(r'trace:file:(?:CreateFileW|MoveFileWithProgressW|DeleteFileW|FindFirstFileExW|GetFileAttributesW) '
@@ -63,6 +64,8 @@ def test_the_zip_is_small_and_for_windows(windows_zip):
         assert listed['platform'] == 'windows-x64' and list(listed['files']) == ['stipple.dll']
         assert not [name for name in archive.namelist() if name.endswith('.so')]
         assert 'stipple/licences/mingw-w64.txt' in archive.namelist()
+        for folder, _ in licences.COMPILED.values():
+            assert f'stipple/licences/{folder}.txt' in archive.namelist()
 
 
 def test_nothing_is_needed_but_windows(windows_library):
