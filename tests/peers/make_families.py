@@ -38,11 +38,15 @@ class Body:
         self._triangles.append(triangles + self._count)
         self._count += len(vertices)
 
+    def arrays(self):
+        """Vertices [n,3], their display colours [n,3] and triangles [m,3]."""
+        return (np.concatenate(self._vertices), np.clip(np.concatenate(self._colours), 0, 1),
+                np.concatenate(self._triangles))
+
     def write(self, path):
-        vertices, colours = np.concatenate(self._vertices), np.concatenate(self._colours)
-        triangles = np.concatenate(self._triangles)
+        vertices, colours, triangles = self.arrays()
         rows = np.zeros(len(vertices), [('place', '<f4', 3), ('colour', 'u1', 3)])
-        rows['place'], rows['colour'] = vertices, np.round(255 * np.clip(colours, 0, 1))
+        rows['place'], rows['colour'] = vertices, np.round(255 * colours)
         faces = np.zeros(len(triangles), [('count', 'u1'), ('corners', '<i4', 3)])
         faces['count'], faces['corners'] = 3, triangles
         names = ''.join(f'property float {name}\n' for name in 'xyz')
