@@ -20,7 +20,7 @@ def _weights_path(chosen):
     """The file that was chosen, or the one in the folder of the Preferences. Errors: StippleError."""
     if chosen:
         return bpy.path.abspath(chosen)
-    folder = preferences.weights_folder()
+    folder = preferences.chosen_weights_folder()  # no network of this kind comes with the add-on
     if not folder:
         raise invalid(f'No folder of weights is chosen: choose the one with {_FILE} in the Preferences of Stipple.')
     path = os.path.join(folder, _FILE)
