@@ -11,7 +11,7 @@
 #include "decode/surface/surface_model.h"
 #include "decode/test_meshes.h"
 #include "math/colour.h"
-#include "math/spherical_harmonics.h"
+#include "mesh/shown_harmonics.h"
 
 namespace stipple {
 namespace {
@@ -70,13 +70,7 @@ TEST(SurfaceDecoder, GivesSplatsThatChangeWithTheView) {
   ASSERT_EQ(cloud.sh_degree, 3);
   ASSERT_EQ(cloud.sh.size(), cloud.size() * 48);
   const auto shown = [&](size_t i, const Vec3d& d, size_t channel) {
-    std::array<double, 16> basis;
-    harmonicBasis(3, d.x(), d.y(), d.z(), basis.data());
-    double value = 0.5;
-    for (size_t k = 0; k < 16; ++k) {
-      value += basis[k] * static_cast<double>(cloud.sh[i * 48 + k * 3 + channel]);
-    }
-    return value;
+    return shownAlong(&cloud.sh[i * 48], 3, d, channel);
   };
   for (size_t i = 0; i < cloud.size(); ++i) {
     // So few directions do not outweigh what holds coefficients small: it takes a third at most of

@@ -3,13 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "data/clouds/splat_cloud.h"
 #include "math/colour.h"
-#include "math/spherical_harmonics.h"
+#include "mesh/shown_harmonics.h"
 
 namespace stipple {
 namespace {
@@ -338,13 +341,12 @@ TEST(SurfaceSampling, ShowsWhatComesToItFromViewDirections) {
   ASSERT_EQ(set.harmonic_degree, 2);
   ASSERT_EQ(set.harmonics.size(), set.size() * 24);
   const auto shown = [&](size_t i, const Vec3d& d) {
-    std::array<double, 9> basis;
-    harmonicBasis(2, d.x(), d.y(), d.z(), basis.data());
-    double value = linearToSrgb(static_cast<double>(set.colours[i * 3]));
-    for (size_t k = 1; k < 9; ++k) {
-      value += basis[k] * static_cast<double>(set.harmonics[(i * 8 + k - 1) * 3]);
+    std::array<float, 27> whole;
+    std::copy_n(&set.harmonics[i * 24], 24, whole.begin() + 3);
+    for (size_t c = 0; c < 3; ++c) {
+      whole[c] = (linearToSrgb(set.colours[i * 3 + c]) - 0.5f) / kShC0;
     }
-    return value;
+    return shownAlong(whole.data(), 2, d, 0);
   };
   for (size_t i = 0; i < set.size(); ++i) {
     const bool is_plain = set.positions[i * 3] > 1.5f;

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "math/colour.h"
-#include "math/spherical_harmonics.h"
+#include "mesh/shown_harmonics.h"
 
 namespace stipple {
 namespace {
@@ -28,17 +28,6 @@ std::vector<float> lattice(size_t count) {
   return directions;
 }
 
-/// What a splat with these coefficients shows along a direction.
-double shown(const std::vector<float>& coefficients, int degree, const Vec3d& d, size_t channel) {
-  std::array<double, 16> basis;
-  harmonicBasis(degree, d.x(), d.y(), d.z(), basis.data());
-  double value = 0.5;
-  for (size_t k = 0; k < coefficients.size() / 3; ++k) {
-    value += basis[k] * static_cast<double>(coefficients[k * 3 + channel]);
-  }
-  return value;
-}
-
 /// What must come to grey so that it shows a display value.
 float addedTo(double display) {
   return static_cast<float>(srgbToLinear(display) - static_cast<double>(kGrey[0]));
@@ -57,7 +46,7 @@ TEST(ViewHarmonics, AreFlatWhereNothingChangesWithTheView) {
     const std::vector<float> seen = fitted(harmonics, std::vector<float>(directions.size(), 0.0f));
     ASSERT_EQ(seen.size(), static_cast<size_t>((degree + 1) * (degree + 1) * 3));
     // A constant fits without a rest, so nothing holds it back. Sums of 25 products in float32.
-    EXPECT_NEAR(shown(seen, degree, Vec3d(0, 0, -1), 1), linearToSrgb(0.2), 2e-6);
+    EXPECT_NEAR(shownAlong(seen.data(), degree, Vec3d(0, 0, -1), 1), linearToSrgb(0.2), 2e-6);
     for (size_t k = 3; k < seen.size(); ++k) EXPECT_NEAR(seen[k], 0.0f, 2e-6f) << k;
   }
 }
@@ -87,7 +76,7 @@ TEST(ViewHarmonics, FollowAShineBetweenTheDirectionsThatTellIt) {
     for (size_t i = 0; i < between.size(); i += 3) {
       const Vec3d d(between[i], between[i + 1], between[i + 2]);
       if (d.z() > -0.3) continue;  // grazing or from behind
-      sum += std::abs(shown(seen, degree, d, 0) - lobe(d));
+      sum += std::abs(shownAlong(seen.data(), degree, d, 0) - lobe(d));
       count += 1;
     }
     mean_error[degree] = sum / count;
@@ -111,7 +100,7 @@ TEST(ViewHarmonics, AskDirectionsFromBehindLittle) {
     if (directions[i + 2] > -0.5f) continue;
     const Vec3d d(directions[i], directions[i + 1], directions[i + 2]);
     // A tenth of the step is what a polynomial of the third degree makes of it.
-    EXPECT_NEAR(shown(seen, 3, d, 0), from_front, 0.05);
+    EXPECT_NEAR(shownAlong(seen.data(), 3, d, 0), from_front, 0.05);
   }
 }
 
