@@ -32,7 +32,7 @@ BAKE_SIZE_TEXT = ("Side of the square image that the light of an object is baked
                   "that it takes grows with its square. What shines is baked at the size of its textures")
 BAKE_SAMPLES_TEXT = "Rays of light for each pixel of the image: more of them take longer and leave less noise"
 BAKE_VIEWS_TEXT = ("Bake what reflects and refracts from 36 directions as well, so that it changes with the view. Blurred "
-                   "reflections come out well, mirrors do not. Takes a few times longer")
+                   "reflections come out well, mirrors do not. Takes about twice as long")
 
 BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"),
                 ('COUNT', "Count", "The budget is a number of splats"))

@@ -234,7 +234,7 @@ def _atlas(areas, light_px, texture_px):
     second = np.stack([np.hstack([high, high]), np.hstack([low + gap, high]), np.hstack([high, low + gap])], 1)
     corners = np.where(is_second[:, None, None], second, first)
     # The insets are of the atlas of light; in the finer one they are wider, in that of views narrower: there a little
-    # of the neighbor's shine gets in, which is nearly the same.
+    # of the neighbour's shine gets in, which is nearly the same.
     return sides, ((origin[:, None, :] + corners) / sides.light).astype(np.float32)
 
 
