@@ -19,8 +19,8 @@ from pathlib import Path
 PROJECT = Path(__file__).resolve().parent.parent
 PACKAGE = PROJECT / 'addon' / 'stipple'
 PLATFORM = 'linux-x64'
-LIBRARIES = ('libstipple.so', 'libstipple_media.so')
-# Of each platform that a release is made for: the one library, which holds what the second above does.
+LIBRARIES = ('libstipple.so', 'libstipple_media.so', 'libstipple_packing.so')
+# Of each platform that a release is made for: the one library, which holds what the others above do.
 SELF_CONTAINED_LIBRARIES = {'linux-x64': ('libstipple.so',), 'windows-x64': ('stipple.dll',)}
 # Where oneDNN was there when the library was built; without it networks run on Stipple's own kernels.
 OPTIONAL_LIBRARIES = ('libstipple_nn.so',)

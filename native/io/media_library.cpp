@@ -15,45 +15,67 @@ namespace {
 #ifdef STIPPLE_MEDIA_INSIDE
 /// A package's library holds the calls itself.
 extern "C" const StippleMediaTable* stipple_media_table(uint32_t version);
+extern "C" const StipplePackingTable* stipple_packing_table(uint32_t version);
 
-const StippleMediaTable* openLibrary() {
+const StippleMediaTable* openMedia() {
   return stipple_media_table(kMediaTableVersion);
 }
-#else
-constexpr char kName[] = "stipple_media";
-constexpr char kTableFunction[] = "stipple_media_table";
 
-[[noreturn]] void failUnavailable(const std::string& why) {
-  fail(ErrorCode::kUnavailable, platform::libraryFile(kName) +
-                                    ", which reads and writes images, meshes, volumes and packed "
-                                    "splats, cannot be loaded: " +
-                                    why);
+const StipplePackingTable* openPacking() {
+  return stipple_packing_table(kPackingTableVersion);
 }
-
-const StippleMediaTable* openLibrary() {
+#else
+/// Opens the library `name` and asks it for the table of this version.
+template <typename Function>
+auto openTable(const char* name, const char* purpose, uint32_t version) {
+  const auto failUnavailable = [&](const std::string& why) {
+    fail(ErrorCode::kUnavailable,
+         platform::libraryFile(name) + ", which " + purpose + ", cannot be loaded: " + why);
+  };
   std::string path, why;
-  void* library = openOwnLibrary(kName, path, why);
+  void* library = openOwnLibrary(name, path, why);
   if (library == nullptr) failUnavailable(why);
   const auto function =
-      reinterpret_cast<StippleMediaTableFunction>(findInLibrary(library, kTableFunction));
-  const StippleMediaTable* table = function != nullptr ? function(kMediaTableVersion) : nullptr;
+      reinterpret_cast<Function>(findInLibrary(library, (std::string(name) + "_table").c_str()));
+  const auto* table = function != nullptr ? function(version) : nullptr;
   if (table == nullptr) {
     closeOwnLibrary(library);
-    failUnavailable(path + " belongs to another version; version " +
-                    std::to_string(kMediaTableVersion) + " of its table is needed");
+    failUnavailable(path + " belongs to another version; version " + std::to_string(version) +
+                    " of its table is needed");
   }
   return table;
 }
+
+const StippleMediaTable* openMedia() {
+  return openTable<StippleMediaTableFunction>(
+      "stipple_media", "reads and writes images, meshes and volumes", kMediaTableVersion);
+}
+
+const StipplePackingTable* openPacking() {
+  return openTable<StipplePackingTableFunction>("stipple_packing", "packs and unpacks splats",
+                                                kPackingTableVersion);
+}
 #endif
+
+/// The table of a library that is opened at the first use; where that fails, the next use tries
+/// again.
+template <typename Table>
+const Table& openedOnce(const Table* (*open)()) {
+  static std::mutex mutex;
+  static const Table* table = nullptr;
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (table == nullptr) table = open();
+  return *table;
+}
 
 }  // namespace
 
 const StippleMediaTable& mediaTable() {
-  static std::mutex mutex;
-  static const StippleMediaTable* table = nullptr;
-  const std::lock_guard<std::mutex> lock(mutex);
-  if (table == nullptr) table = openLibrary();
-  return *table;
+  return openedOnce(openMedia);
+}
+
+const StipplePackingTable& packingTable() {
+  return openedOnce(openPacking);
 }
 
 void callMedia(const std::function<void(StippleMediaStatus*)>& call) {

@@ -12,7 +12,12 @@ namespace stipple {
 /// Errors: kUnavailable with the loader's reason; a later call tries again.
 const StippleMediaTable& mediaTable();
 
-/// Runs one call of the table and throws what it reports as an Error.
+/// The calls of libstipple_packing, likewise. It is a library of its own, because it needs zlib,
+/// Zstandard and libwebp alone, and the libraries behind images and volumes take far longer to load
+/// than a file of splats to unpack.
+const StipplePackingTable& packingTable();
+
+/// Runs one call of a table and throws what it reports as an Error.
 void callMedia(const std::function<void(StippleMediaStatus*)>& call);
 
 /// A sink around a function(array, bytes) → address; an exception in it leaves as null.

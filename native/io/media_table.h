@@ -3,13 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The private table of calls between libstipple and libstipple_media: plain C data only, so that
-/// neither side sees an exception or a type of the other's libraries. Both are built together; the
-/// version guards against a file left over from another build.
+/// The private tables of calls from libstipple to libstipple_media and libstipple_packing: plain C
+/// data only, so that neither side sees an exception or a type of the other's libraries. All are
+/// built together; the versions guard against a file left over from another build.
 
 namespace stipple {
 
-constexpr uint32_t kMediaTableVersion = 7;
+constexpr uint32_t kMediaTableVersion = 8;
+constexpr uint32_t kPackingTableVersion = 1;
 
 extern "C" {
 
@@ -118,10 +119,6 @@ enum StippleMediaSurfaceArray : uint32_t {
 };
 constexpr uint32_t kMediaNoCorner = UINT32_MAX;
 
-enum StippleMediaWebpArray : uint32_t {
-  kMediaWebpBytes = 0,  ///< uint8: the encoded file
-};
-
 /// How the splats of a glTF primitive are stored.
 enum StippleMediaSplatPacking : uint32_t {
   kMediaSplatsInArrays = 0,
@@ -181,6 +178,13 @@ struct StippleMediaTable {
   /// metre. In: adaptivity 0..1, larger faces where it is flat.
   void (*volume_surface)(const StippleMediaVolume* volume, double threshold, double adaptivity,
                          const StippleMediaSink* sink, StippleMediaStatus* status);
+  /// The splats of a glTF or GLB file's scene (KHR_gaussian_splatting).
+  void (*gltf_splats_read)(const char* path, const StippleMediaSink* sink,
+                           StippleMediaStatus* status);
+};
+
+struct StipplePackingTable {
+  uint32_t version;
   /// Compressed streams. In: what, which messages name; bytes [count]. Unpacking writes at most
   /// `capacity` bytes to `out` and says how many; packing hands one array to the sink.
   void (*gzip_unpack)(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
@@ -198,7 +202,7 @@ struct StippleMediaTable {
                     uint32_t* height, StippleMediaStatus* status);
   void (*webp_decode)(const char* name, const uint8_t* bytes, uint64_t byte_count, uint8_t* rgba,
                       uint64_t rgba_bytes, StippleMediaStatus* status);
-  /// Lossless; the sink's one array is kMediaWebpBytes.
+  /// Lossless; the sink's one array is the encoded file.
   void (*webp_encode)(const char* name, const uint8_t* rgba, uint32_t width, uint32_t height,
                       const StippleMediaSink* sink, StippleMediaStatus* status);
 
@@ -207,14 +211,11 @@ struct StippleMediaTable {
                       uint64_t whole_bytes, StippleMediaStatus* status);
   /// CRC-32 of zip entries.
   uint32_t (*zip_checksum)(const uint8_t* bytes, uint64_t byte_count);
-
-  /// The splats of a glTF or GLB file's scene (KHR_gaussian_splatting).
-  void (*gltf_splats_read)(const char* path, const StippleMediaSink* sink,
-                           StippleMediaStatus* status);
 };
 
-/// The one function that libstipple_media exports: null for another version.
+/// The one function that each of both libraries exports: null for another version.
 typedef const StippleMediaTable* (*StippleMediaTableFunction)(uint32_t version);
+typedef const StipplePackingTable* (*StipplePackingTableFunction)(uint32_t version);
 
 }  // extern "C"
 

@@ -7,10 +7,11 @@ namespace stipple {
 
 RgbaBytes decodeWebp(const std::vector<uint8_t>& bytes, uint64_t max_pixels,
                      const std::string& name) {
-  const StippleMediaTable& media = mediaTable();
+  const StipplePackingTable& packing = packingTable();
   RgbaBytes image;
   callMedia([&](StippleMediaStatus* status) {
-    media.webp_size(name.c_str(), bytes.data(), bytes.size(), &image.width, &image.height, status);
+    packing.webp_size(name.c_str(), bytes.data(), bytes.size(), &image.width, &image.height,
+                      status);
   });
   if (image.pixelCount() > max_pixels) {
     fail(ErrorCode::kFormat, name + " has " + std::to_string(image.width) + " x " +
@@ -19,8 +20,8 @@ RgbaBytes decodeWebp(const std::vector<uint8_t>& bytes, uint64_t max_pixels,
   }
   image.bytes.resize(static_cast<size_t>(image.pixelCount() * 4));
   callMedia([&](StippleMediaStatus* status) {
-    media.webp_decode(name.c_str(), bytes.data(), bytes.size(), image.bytes.data(),
-                      image.bytes.size(), status);
+    packing.webp_decode(name.c_str(), bytes.data(), bytes.size(), image.bytes.data(),
+                        image.bytes.size(), status);
   });
   return image;
 }
@@ -31,10 +32,10 @@ std::vector<uint8_t> encodeWebp(const RgbaBytes& image, const std::string& name)
     bytes.resize(static_cast<size_t>(count));
     return bytes.data();
   });
-  const StippleMediaTable& media = mediaTable();
+  const StipplePackingTable& packing = packingTable();
   callMedia([&](StippleMediaStatus* status) {
-    media.webp_encode(name.c_str(), image.bytes.data(), image.width, image.height, sink.get(),
-                      status);
+    packing.webp_encode(name.c_str(), image.bytes.data(), image.width, image.height, sink.get(),
+                        status);
   });
   return bytes;
 }

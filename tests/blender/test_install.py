@@ -47,7 +47,7 @@ def test_zip_has_one_top_folder_and_the_libraries(archive):
     names = zipfile.ZipFile(archive).namelist()
     assert {n.split('/')[0] for n in names} == {'stipple'}
     assert {'stipple/__init__.py', 'stipple/blender_manifest.toml', 'stipple/LICENSE', 'stipple/lib/libstipple.so',
-            'stipple/lib/libstipple_media.so'} <= set(names)
+            'stipple/lib/libstipple_media.so', 'stipple/lib/libstipple_packing.so'} <= set(names)
     # Built where oneDNN is; the zip has it then.
     is_built = (Path(os.environ['STIPPLE_LIBRARY']).parent / 'libstipple_nn.so').is_file()
     assert ('stipple/lib/libstipple_nn.so' in names) == is_built

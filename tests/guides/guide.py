@@ -96,7 +96,7 @@ class Guide:
         command = _commands_of('lib/libstipple.so')[-1].replace('-o lib/libstipple.so', ' '.join(
             ['-o', shlex.quote(str(library)), *map(shlex.quote, map(str, objects))]), 1)
         _run(command, BUILD, shell=True)
-        for name in ('libstipple_media.so', 'libstipple_nn.so'):
+        for name in ('libstipple_media.so', 'libstipple_packing.so', 'libstipple_nn.so'):
             if (BUILD / 'lib' / name).exists():
                 (library.parent / name).symlink_to(BUILD / 'lib' / name)
         return library

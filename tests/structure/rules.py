@@ -38,8 +38,8 @@ THIRD_PARTY = {
 # A format's library is known to the files of that format only (benchmarks may measure against some).
 FORMAT_FILES = {'OpenVDB': r'native/(io/media/volume_|package/parts/volume_|bench/)',
                 'tinygltf': r'native/io/media/gltf_',
-                'OpenImageIO': r'native/(io/media/image_|bench/)', 'zlib': r'native/io/media/zlib_',
-                'zstd': r'native/io/media/zstd_', 'libwebp': r'native/io/media/(decoders/)?webp_',
+                'OpenImageIO': r'native/(io/media/image_|bench/)', 'zlib': r'native/io/media/packing/zlib_',
+                'zstd': r'native/io/media/packing/zstd_', 'libwebp': r'native/io/media/(decoders|packing)/webp_',
                 'libpng': r'native/io/media/decoders/png_', 'libjpeg': r'native/io/media/decoders/jpeg_',
                 'OpenEXR': r'native/io/media/decoders/exr_',
                 'oneDNN': r'native/nn/onednn/'}

@@ -11,6 +11,7 @@ HEADER = ROOT / 'native' / 'include' / 'stipple' / 'stipple.h'
 BUILD = pathlib.Path(os.environ.get('STIPPLE_BUILD_DIR', ROOT / 'build' / 'release'))
 LIBRARY = BUILD / 'lib' / 'libstipple.so'
 MEDIA_LIBRARY = BUILD / 'lib' / 'libstipple_media.so'
+PACKING_LIBRARY = BUILD / 'lib' / 'libstipple_packing.so'
 NN_LIBRARY = BUILD / 'lib' / 'libstipple_nn.so'  # built where oneDNN is
 
 
@@ -39,7 +40,7 @@ def test_another_need_is_found(tmp_path):
     assert len(found) == 1 and 'needs libtinygltf.so' in found[0]
 
 
-@pytest.mark.parametrize('file', [LIBRARY, MEDIA_LIBRARY, NN_LIBRARY, BUILD / 'bin' / 'stipple'],
+@pytest.mark.parametrize('file', [LIBRARY, MEDIA_LIBRARY, PACKING_LIBRARY, NN_LIBRARY, BUILD / 'bin' / 'stipple'],
                          ids=lambda path: path.name)
 def test_mpi_is_linked_by_a_program_of_its_own_alone(file):
     if file == NN_LIBRARY and not file.exists():
@@ -55,7 +56,7 @@ def test_a_link_with_mpi_is_found(tmp_path):
 
 
 @needs_plain_build
-@pytest.mark.parametrize('library', [LIBRARY, MEDIA_LIBRARY, NN_LIBRARY], ids=lambda path: path.name)
+@pytest.mark.parametrize('library', [LIBRARY, MEDIA_LIBRARY, PACKING_LIBRARY, NN_LIBRARY], ids=lambda path: path.name)
 def test_the_libraries_export_only_their_own_names(library):
     if library == NN_LIBRARY and not library.exists():
         pytest.skip('oneDNN is not on this machine, so libstipple_nn.so is not built')

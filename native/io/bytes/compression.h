@@ -11,7 +11,7 @@ namespace stipple {
 
 using ByteVector = DefaultInitVector<uint8_t>;
 
-/// How bytes are packed. Both go through libstipple_media.
+/// How bytes are packed. Both go through libstipple_packing.
 enum class Compression : uint32_t { kGzip = 0, kZstd = 1 };
 
 /// Unpacks one stream into out [capacity] and stops there, whatever the stream goes on to hold: the

@@ -196,18 +196,18 @@ std::vector<uint8_t> ZipReader::read(const std::string& name, uint64_t limit) co
   std::vector<uint8_t> stored(static_cast<size_t>(entry.stored_bytes));
   file_.readAt(data, stored.data(), stored.size());
   const std::string what = file_.path() + ": " + name;
-  const StippleMediaTable& media = mediaTable();
+  const StipplePackingTable& packing = packingTable();
   std::vector<uint8_t> whole;
   if (entry.deflated) {
     whole.resize(static_cast<size_t>(entry.whole_bytes));
     callMedia([&](StippleMediaStatus* status) {
-      media.zip_inflate(what.c_str(), stored.data(), stored.size(), whole.data(), whole.size(),
-                        status);
+      packing.zip_inflate(what.c_str(), stored.data(), stored.size(), whole.data(), whole.size(),
+                          status);
     });
   } else {
     whole = std::move(stored);
   }
-  if (media.zip_checksum(whole.data(), whole.size()) != entry.checksum) {
+  if (packing.zip_checksum(whole.data(), whole.size()) != entry.checksum) {
     fail(ErrorCode::kFormat, what + " is damaged: its checksum is not the archive's");
   }
   return whole;
@@ -229,7 +229,7 @@ void ZipWriter::add(const std::string& name, const std::vector<uint8_t>& bytes) 
   append(common, kStored, 2);
   append(common, 0, 2);
   append(common, kNoDate, 2);
-  append(common, mediaTable().zip_checksum(bytes.data(), bytes.size()), 4);
+  append(common, packingTable().zip_checksum(bytes.data(), bytes.size()), 4);
   append(common, static_cast<uint32_t>(bytes.size()), 4);
   append(common, static_cast<uint32_t>(bytes.size()), 4);
   append(common, static_cast<uint32_t>(name.size()), 2);

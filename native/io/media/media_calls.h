@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "data/meshes/tri_mesh.h"
+#include "io/media/media_status.h"
 #include "io/media_table.h"
 
 namespace stipple::media {
@@ -35,54 +36,12 @@ void stipple_media_volume_read(const char* path, double* voxel_size, double* ori
 void stipple_media_volume_surface(const StippleMediaVolume* volume, double threshold,
                                   double adaptivity, const StippleMediaSink* sink,
                                   StippleMediaStatus* status);
-void stipple_media_gzip_unpack(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
-                               uint64_t capacity, uint64_t* produced, StippleMediaStatus* status);
-void stipple_media_gzip_pack(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
-                             const StippleMediaSink* sink, StippleMediaStatus* status);
-void stipple_media_zstd_unpack(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
-                               uint64_t capacity, uint64_t* produced, StippleMediaStatus* status);
-void stipple_media_zstd_pack(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
-                             const StippleMediaSink* sink, StippleMediaStatus* status);
-void stipple_media_webp_size(const char* name, const uint8_t* bytes, uint64_t byte_count,
-                             uint32_t* width, uint32_t* height, StippleMediaStatus* status);
-void stipple_media_webp_decode(const char* name, const uint8_t* bytes, uint64_t byte_count,
-                               uint8_t* rgba, uint64_t rgba_bytes, StippleMediaStatus* status);
-void stipple_media_webp_encode(const char* name, const uint8_t* rgba, uint32_t width,
-                               uint32_t height, const StippleMediaSink* sink,
-                               StippleMediaStatus* status);
-void stipple_media_zip_inflate(const char* name, const uint8_t* bytes, uint64_t byte_count,
-                               uint8_t* whole, uint64_t whole_bytes, StippleMediaStatus* status);
-uint32_t stipple_media_zip_checksum(const uint8_t* bytes, uint64_t byte_count);
 void stipple_media_gltf_splats_read(const char* path, const StippleMediaSink* sink,
                                     StippleMediaStatus* status);
 }
 
-/// Turns what `work` throws into a status; an exception of another library is a fault of the file,
-/// and its text follows the path.
-void report(StippleMediaStatus* status, int code, const std::string& message);
-void reportCurrentException(const char* path, StippleMediaStatus* status);
-template <typename Work>
-void guard(const char* path, StippleMediaStatus* status, const Work& work) {
-  status->code = 0;
-  status->message[0] = '\0';
-  try {
-    work();
-  } catch (...) {
-    reportCurrentException(path, status);
-  }
-}
-
 /// Ends a file that was written by a library or for it. Errors: kIo where not all of it is there.
 void finishFile(std::ofstream& file, const char* path);
-
-/// Hands an array to the caller. Errors: kOutOfMemory.
-void giveBytes(const StippleMediaSink& sink, uint32_t array, const void* data, size_t bytes);
-template <typename T>
-void give(const StippleMediaSink& sink, uint32_t array, const std::vector<T>& values) {
-  giveBytes(sink, array, values.data(), values.size() * sizeof(T));
-}
-/// Room for `bytes` bytes at the caller's. Errors: kOutOfMemory.
-void* allocate(const StippleMediaSink& sink, uint32_t array, size_t bytes);
 
 /// A picture as it is in its file or in memory.
 struct DecodedImage {

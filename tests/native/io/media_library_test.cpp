@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string>
 
+#include "io/bytes/compression.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "io/volume_file.h"
@@ -40,6 +41,7 @@ class MediaLibrary : public ScratchFolder {
 TEST_F(MediaLibrary, IsFoundBesideTheProgram) {
   EXPECT_EQ(mediaTable().version, kMediaTableVersion);
   EXPECT_EQ(&mediaTable(), &mediaTable());
+  EXPECT_EQ(packingTable().version, kPackingTableVersion);
 }
 
 TEST_F(MediaLibrary, IsUnavailableWhereItIsNotInstalled) {
@@ -59,6 +61,29 @@ TEST_F(MediaLibrary, IsUnavailableWhereItIsNotInstalled) {
   unavailable([&] { writeVolumeFile(volume, path("a.vdb")); });
   EXPECT_FALSE(fs::exists(path("a.png")));
   EXPECT_FALSE(fs::exists(path("a.vdb")));
+  expectError(ErrorCode::kUnavailable,
+              {"libstipple_packing.so", "packs and unpacks splats", "No such file"},
+              [] { packingTable(); });
+}
+
+TEST_F(MediaLibrary, IsNotNeededToUnpackSplats) {
+  if (!isAlone()) {
+    const std::string library = "libstipple_packing.so";
+    fs::copy_file(fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib" / library,
+                  path(library));
+    return passesAlone("IsNotNeededToUnpackSplats");
+  }
+  const std::string text = "a line of text";
+  const auto* bytes = reinterpret_cast<const uint8_t*>(text.data());
+  for (const Compression compression : {Compression::kGzip, Compression::kZstd}) {
+    const ByteVector packed = packBytes(compression, bytes, text.size(), 6, "text");
+    std::string whole(text.size(), '\0');
+    EXPECT_EQ(unpackBytes(compression, packed.data(), packed.size(),
+                          reinterpret_cast<uint8_t*>(whole.data()), whole.size(), "text"),
+              text.size());
+    EXPECT_EQ(whole, text);
+  }
+  expectError(ErrorCode::kUnavailable, {"libstipple_media.so"}, [] { mediaTable(); });
 }
 
 TEST_F(MediaLibrary, IsUnavailableWhereItIsDamaged) {

@@ -1,4 +1,4 @@
-// WebP as a picture, its alpha straight. Packed splats are read by webp_media.cpp.
+// WebP as a picture, its alpha straight. Packed splats are read by packing/webp_images.cpp.
 #include <webp/decode.h>
 
 #include <string>

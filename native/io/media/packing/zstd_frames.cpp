@@ -9,7 +9,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "io/media/media_calls.h"
+#include "io/media/media_status.h"
+#include "io/media/packing/packing_calls.h"
 
 namespace stipple::media {
 
@@ -29,8 +30,9 @@ struct StreamFree {
 
 }  // namespace
 
-void stipple_media_zstd_unpack(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
-                               uint64_t capacity, uint64_t* produced, StippleMediaStatus* status) {
+void stipple_packing_zstd_unpack(const char* what, const uint8_t* bytes, uint64_t count,
+                                 uint8_t* out, uint64_t capacity, uint64_t* produced,
+                                 StippleMediaStatus* status) {
   guard(what, status, [&] {
     // As a stream, so that a frame that goes on after `capacity` bytes is told from a damaged one.
     const std::unique_ptr<ZSTD_DStream, StreamFree> stream(ZSTD_createDStream());
@@ -56,8 +58,9 @@ void stipple_media_zstd_unpack(const char* what, const uint8_t* bytes, uint64_t 
   });
 }
 
-void stipple_media_zstd_pack(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
-                             const StippleMediaSink* sink, StippleMediaStatus* status) {
+void stipple_packing_zstd_pack(const char* what, const uint8_t* bytes, uint64_t count,
+                               int32_t level, const StippleMediaSink* sink,
+                               StippleMediaStatus* status) {
   guard(what, status, [&] {
     const std::unique_ptr<ZSTD_CCtx, PackerFree> packer(ZSTD_createCCtx());
     if (packer == nullptr) throw std::bad_alloc();

@@ -6,7 +6,8 @@
 #include <string>
 
 #include "base/error.h"
-#include "io/media/media_calls.h"
+#include "io/media/media_status.h"
+#include "io/media/packing/packing_calls.h"
 
 namespace stipple::media {
 
@@ -42,8 +43,8 @@ struct EncoderMemory {
 
 }  // namespace
 
-void stipple_media_webp_size(const char* name, const uint8_t* bytes, uint64_t byte_count,
-                             uint32_t* width, uint32_t* height, StippleMediaStatus* status) {
+void stipple_packing_webp_size(const char* name, const uint8_t* bytes, uint64_t byte_count,
+                               uint32_t* width, uint32_t* height, StippleMediaStatus* status) {
   guard(name, status, [&] {
     int w = 0;
     int h = 0;
@@ -53,8 +54,8 @@ void stipple_media_webp_size(const char* name, const uint8_t* bytes, uint64_t by
   });
 }
 
-void stipple_media_webp_decode(const char* name, const uint8_t* bytes, uint64_t byte_count,
-                               uint8_t* rgba, uint64_t rgba_bytes, StippleMediaStatus* status) {
+void stipple_packing_webp_decode(const char* name, const uint8_t* bytes, uint64_t byte_count,
+                                 uint8_t* rgba, uint64_t rgba_bytes, StippleMediaStatus* status) {
   guard(name, status, [&] {
     int width = 0;
     int height = 0;
@@ -67,9 +68,9 @@ void stipple_media_webp_decode(const char* name, const uint8_t* bytes, uint64_t 
   });
 }
 
-void stipple_media_webp_encode(const char* name, const uint8_t* rgba, uint32_t width,
-                               uint32_t height, const StippleMediaSink* sink,
-                               StippleMediaStatus* status) {
+void stipple_packing_webp_encode(const char* name, const uint8_t* rgba, uint32_t width,
+                                 uint32_t height, const StippleMediaSink* sink,
+                                 StippleMediaStatus* status) {
   guard(name, status, [&] {
     WebPConfig config;
     if (WebPConfigInit(&config) == 0) {
@@ -95,7 +96,7 @@ void stipple_media_webp_encode(const char* name, const uint8_t* rgba, uint32_t w
                " cannot be made a WebP image (libwebp's error " + std::to_string(error) +
                "); at most 16383 x 16383 is allowed");
     }
-    giveBytes(*sink, kMediaWebpBytes, memory.writer.mem, memory.writer.size);
+    giveBytes(*sink, 0, memory.writer.mem, memory.writer.size);
   });
 }
 

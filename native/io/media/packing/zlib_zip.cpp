@@ -5,7 +5,8 @@
 #include <string>
 
 #include "base/error.h"
-#include "io/media/media_calls.h"
+#include "io/media/media_status.h"
+#include "io/media/packing/packing_calls.h"
 
 namespace stipple::media {
 
@@ -31,8 +32,8 @@ struct Inflater {
 
 }  // namespace
 
-void stipple_media_zip_inflate(const char* name, const uint8_t* bytes, uint64_t byte_count,
-                               uint8_t* whole, uint64_t whole_bytes, StippleMediaStatus* status) {
+void stipple_packing_zip_inflate(const char* name, const uint8_t* bytes, uint64_t byte_count,
+                                 uint8_t* whole, uint64_t whole_bytes, StippleMediaStatus* status) {
   guard(name, status, [&] {
     Inflater inflater;
     z_stream& stream = inflater.stream;
@@ -60,7 +61,7 @@ void stipple_media_zip_inflate(const char* name, const uint8_t* bytes, uint64_t 
   });
 }
 
-uint32_t stipple_media_zip_checksum(const uint8_t* bytes, uint64_t byte_count) {
+uint32_t stipple_packing_zip_checksum(const uint8_t* bytes, uint64_t byte_count) {
   uLong checksum = crc32(0, nullptr, 0);
   for (uint64_t done = 0; done < byte_count;) {
     const uInt count = piece(byte_count - done);

@@ -10,7 +10,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "io/media/media_calls.h"
+#include "io/media/media_status.h"
+#include "io/media/packing/packing_calls.h"
 
 namespace stipple::media {
 
@@ -76,8 +77,9 @@ std::vector<uint8_t> packedPiece(const char* what, const uint8_t* bytes, uint64_
 
 }  // namespace
 
-void stipple_media_gzip_unpack(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
-                               uint64_t capacity, uint64_t* produced, StippleMediaStatus* status) {
+void stipple_packing_gzip_unpack(const char* what, const uint8_t* bytes, uint64_t count,
+                                 uint8_t* out, uint64_t capacity, uint64_t* produced,
+                                 StippleMediaStatus* status) {
   guard(what, status, [&] {
     Inflater inflater;
     z_stream& stream = inflater.stream;
@@ -112,8 +114,9 @@ void stipple_media_gzip_unpack(const char* what, const uint8_t* bytes, uint64_t 
   });
 }
 
-void stipple_media_gzip_pack(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
-                             const StippleMediaSink* sink, StippleMediaStatus* status) {
+void stipple_packing_gzip_pack(const char* what, const uint8_t* bytes, uint64_t count,
+                               int32_t level, const StippleMediaSink* sink,
+                               StippleMediaStatus* status) {
   guard(what, status, [&] {
     const uint64_t piece_count = std::max<uint64_t>(1, (count + kPiece - 1) / kPiece);
     std::vector<std::vector<uint8_t>> pieces(piece_count);
