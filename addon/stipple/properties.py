@@ -10,7 +10,8 @@ from .binding.errors import StippleError
 from .scene import overlays, selection_settings
 from .scene.fit import fit_proposal, fitting, strategies
 from .scene.sequence import sequences
-from .scene.source import bound, mesh_models, setting_paths, source_paths, source_settings, sources, sync
+from .scene.source import (bound, mesh_models, setting_paths, source_paths, source_settings, sources, splat_data,
+                           sync)
 from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -39,6 +40,10 @@ BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats
 CROP_TIMES = (('SHOWN', "Shown Frame", "Splats that move are where they are at the frame that is shown"),
               ('CLIP', "Whole Clip", "Splats that move are inside if they are at any frame of their clip while they show"))
 SIDES = (('INSIDE', "Inside", "Keep what is inside"), ('OUTSIDE', "Outside", "Keep what is outside"))
+
+
+def _is_splat_object(_settings, obj):
+    return splat_data.is_splat_object(obj)
 
 
 class STIPPLE_PG_source_object(bpy.types.PropertyGroup):
@@ -292,6 +297,9 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                         items=(('AUTO', "Auto", "The field gets a shell where views are opaque: far out, or close "
                                                 "behind the walls of a closed room"),
                                ('ON', "On", "Always"), ('OFF', "Off", "Never")), options=set())
+    begin_with: PointerProperty(name="Begin With", type=bpy.types.Object, poll=_is_splat_object,
+                                description="The fit begins with a copy of this object's splats where they are, as Add "
+                                            "Detail, a mesh or another fit left them; empty: it makes its own")
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
                       options=set())
     shown: EnumProperty(name="Show", description="What the 3D view shows until you accept the fit; renders show the "

@@ -14,6 +14,7 @@
 #include "data/clouds/cloud_transform.h"
 #include "data/position_bounds.h"
 #include "io/splats/splat_file.h"
+#include "io/usd/usd_scene_writer.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -21,6 +22,21 @@ using namespace stipple::api;
 static_assert(std::size(StippleCloudColumns{}.rest) == kMaxShColumns);
 
 namespace {
+
+std::vector<UsdObject> sceneObjects(const StippleSceneObject* objects, uint64_t count) {
+  std::vector<UsdObject> made;
+  const StructArray<StippleSceneObject> array(objects, count, "objects");
+  for (uint64_t i = 0; i < count; ++i) {
+    const std::string name = array.nameOf(i);
+    const StippleSceneObject given = complete(array.at(i), name.c_str());
+    UsdObject object;
+    object.name = &require(given.name_utf8, (name + ".name_utf8").c_str());
+    object.cloud = require(given.cloud, (name + ".cloud").c_str()).cloud.get();
+    object.matrix = Eigen::Map<const Mat4d>(given.matrix);
+    made.push_back(std::move(object));
+  }
+  return made;
+}
 
 /// A handle of values that are in range, with quaternions of length one.
 StippleCloud* handleOf(const Context& context, SplatCloud cloud) {
@@ -228,6 +244,19 @@ StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf
     const std::string path = &require(path_utf8, "path_utf8");
     const SplatWriteOptions write = writeOptions(options);
     withThreads(cloud->context->thread_count, [&] { writeSplatFile(*cloud->cloud, path, write); });
+  });
+}
+
+StippleStatus stipple_scene_save(const StippleSceneObject* objects, uint64_t count, uint32_t frame,
+                                 const char* path_utf8, const StippleCloudSaveOptions* options) {
+  return guarded([&] {
+    const std::string path = &require(path_utf8, "path_utf8");
+    if (count < 1) fail(ErrorCode::kInvalidArgument, "count is 0; at least 1 object is needed");
+    const Frame led_to = enumValue<Frame>(frame, kLastFrame, "frame");
+    const std::vector<UsdObject> scene = sceneObjects(objects, count);
+    const SplatWriteOptions write = writeOptions(options);
+    withThreads(objects[0].cloud->context->thread_count,
+                [&] { writeUsdScene(scene, led_to, path, write); });
   });
 }
 

@@ -44,6 +44,21 @@ StippleFitFigures figuresTo(const FitStatus& status) {
   return out;
 }
 
+/// In: start: null for splats of its own.
+StippleJob* startedFit(StippleContext& context, const StippleViews& views,
+                       const StippleFitOptions* options, std::shared_ptr<const SplatCloud> start) {
+  auto session = std::make_shared<FitSession>(context.state->backends, sourceOf(views),
+                                              fitOptionsFrom(options), std::move(start));
+  context.state->requireMemory(session->memoryBound(), "this fit");
+  return startJob(
+      context.state,
+      [session](Progress& progress) -> JobResult {
+        session->run(progress);
+        return {};
+      },
+      session);
+}
+
 }  // namespace
 
 namespace stipple::api {
@@ -65,16 +80,18 @@ StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* vie
     require(context, "context");
     require(views, "views");
     require(job, "job");
-    auto session = std::make_shared<FitSession>(context->state->backends, sourceOf(*views),
-                                                fitOptionsFrom(options));
-    context->state->requireMemory(session->memoryBound(), "this fit");
-    *job = startJob(
-        context->state,
-        [session](Progress& progress) -> JobResult {
-          session->run(progress);
-          return {};
-        },
-        session);
+    *job = startedFit(*context, *views, options, nullptr);
+  });
+}
+
+StippleStatus stipple_fit_start_from(StippleContext* context, const StippleCloud* cloud,
+                                     const StippleViews* views, const StippleFitOptions* options,
+                                     StippleJob** job) {
+  return guarded([&] {
+    require(context, "context");
+    require(views, "views");
+    require(job, "job");
+    *job = startedFit(*context, *views, options, require(cloud, "cloud").cloud);
   });
 }
 

@@ -46,6 +46,11 @@ RefineOptions refineSettings(const StippleRefineOptions& given) {
   settings.view_size = given.view_size;
   settings.rig = enumValue<ViewRig>(given.view_rig, 2, "options->view_rig");
   settings.seed = given.seed;
+  if (!std::isfinite(given.seconds) || given.seconds < 0) {
+    fail(ErrorCode::kInvalidArgument, "options->seconds is " + std::to_string(given.seconds) +
+                                          "; 0 (no limit) or more is allowed");
+  }
+  settings.seconds = given.seconds;
   return settings;
 }
 

@@ -26,6 +26,7 @@ constexpr int kRepeats = 5;
 struct Loss {
   std::vector<float> gradient;
   std::vector<float> residual;
+  std::vector<float> edges;
 
   explicit Loss(const SplatCase& c) {
     std::mt19937 random(2);
@@ -35,11 +36,18 @@ struct Loss {
     residual.resize(pixels * 3);
     for (float& value : gradient) value = uniform(random);
     for (float& value : residual) value = 0.1f * uniform(random);
+    edges.resize(pixels);
+    for (float& value : edges) value = 0.5f + 0.5f * uniform(random);
   }
   BackwardInput input(BackwardWants wants) const {
     BackwardInput input;
     input.colour_gradient = gradient;
     if (wants.depth) input.depth_gradient = std::span(residual).first(residual.size() / 3);
+    if (wants.mode == BackwardMode::kEdges) {
+      input.edge_weights = edges;
+      input.with_screen_gradients = true;
+      return input;
+    }
     if (wants.mode != BackwardMode::kGradients) input.residual = residual;
     if (wants.mode == BackwardMode::kStatistics) {
       input.with_blending_weights = true;
@@ -261,6 +269,17 @@ void againstOneThread(benchmark::State& state, const SplatCase& c) {
       state, "one_thread", [&] { goBack(input, 2); }, [&] { goBack(input, 1); });
 }
 
+/// What `improved` asks for, over what `adaptive` does.
+void edgesToGradients(benchmark::State& state, const SplatCase& c) {
+  const Loss loss(c);
+  BackwardInput plain = loss.input({BackwardMode::kGradients, false});
+  plain.with_screen_gradients = true;
+  const BackwardInput edges = loss.input({BackwardMode::kEdges, false});
+  draw(c, 2);
+  compare(
+      state, "without", [&] { goBack(edges, 2); }, [&] { goBack(plain, 2); });
+}
+
 /// AVX2 over the best instruction set, the loop alone.
 void againstNarrow(benchmark::State& state, const SplatCase& c) {
   const Loss loss(c);
@@ -306,6 +325,7 @@ const bool registered = [] {
         BackwardWants{BackwardMode::kContributions, false});
     add("splat.backward_statistics." + name, kRepeats, againstFloor, c,
         BackwardWants{BackwardMode::kStatistics, false});
+    add("splat.backward_edges." + name, kRepeats, edgesToGradients, c);
     add("splat.contributions_per_pair." + name, 2, contributionsPerPair, c);
     add("splat.backward_2_threads." + name, kRepeats, againstOneThread, c);
     add("splat.backward_avx2." + name, 1, againstNarrow, c);

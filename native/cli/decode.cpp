@@ -21,6 +21,7 @@ struct Arguments {
   std::optional<int64_t> anchors;  // the model's own where there are none
   std::optional<double> ratio;
   int64_t refine = 0;
+  std::optional<double> refine_seconds;
   bool smooth = false;
   int64_t gaussians_per_anchor = 1;
   uint64_t seed = 0;
@@ -79,6 +80,14 @@ void checkBudget(const Arguments& arguments) {
                   "; above 0 and up to 1 is allowed");
   }
   if (arguments.refine != 0) counted(arguments.refine, "--refine", kMaxRefineSteps);
+  if (arguments.refine_seconds && !(*arguments.refine_seconds > 0)) {
+    throw Failure("--refine-seconds is " + std::to_string(*arguments.refine_seconds) +
+                  "; above 0 is allowed");
+  }
+}
+
+bool refines(const Arguments& arguments) {
+  return arguments.refine != 0 || arguments.refine_seconds;
 }
 
 StippleModelSettings settingsOf(const Model& model) {
@@ -110,8 +119,10 @@ Cloud refined(const Cloud& cloud, const Source& source, const Arguments& argumen
   }
   StippleRefineOptions options;
   stipple_refine_options_init(&options);
-  options.iterations =
-      static_cast<uint32_t>(counted(arguments.refine, "--refine", kMaxRefineSteps));
+  // Where only the time is given, as many steps as fit.
+  const int64_t steps = arguments.refine != 0 ? arguments.refine : kMaxRefineSteps;
+  options.iterations = static_cast<uint32_t>(counted(steps, "--refine", kMaxRefineSteps));
+  options.seconds = arguments.refine_seconds.value_or(0);
   options.seed = arguments.seed;
   const auto* start = const_cast<const StippleCloud*>(cloud.get());
   const auto* given = const_cast<const StippleRefineOptions*>(&options);
@@ -171,7 +182,7 @@ void decode(const Context& context, const Arguments& arguments) {
   }
   const Source source = sourceOf(context, arguments);
   // Refined splats of a mesh are explicit ones: their model is a tree of merges.
-  const bool of_refined = arguments.refine != 0 && source.mesh != nullptr;
+  const bool of_refined = refines(arguments) && source.mesh != nullptr;
   if (out_kind == FileKind::kModel && !of_refined) {
     check(stipple_model_save(source.model.get(), arguments.out.c_str()));
     return;
@@ -180,7 +191,7 @@ void decode(const Context& context, const Arguments& arguments) {
   const auto job = make<Job>(stipple_model_decode_start, source.model.get(), &options);
   finish(job);
   auto cloud = make<Cloud>(stipple_job_cloud, job.get());
-  if (arguments.refine != 0) cloud = refined(cloud, source, arguments);
+  if (refines(arguments)) cloud = refined(cloud, source, arguments);
   if (out_kind == FileKind::kModel) {
     const Model tree = hierarchyOf(context, cloud, arguments.seed);
     check(stipple_model_save(tree.get(), arguments.out.c_str()));
@@ -222,6 +233,9 @@ void addDecode(CLI::App& app, const Context& context) {
       "--refine", arguments->refine,
       "Number of steps that fit the result to images of the mesh, or of all existing "
       "splats");
+  command->add_option("--refine-seconds", arguments->refine_seconds,
+                      "This fitting ends after so many seconds, however busy the machine is, with "
+                      "the steps that fit into them; without --refine as many as that are");
   command
       ->add_option("--gaussians-per-anchor", arguments->gaussians_per_anchor,
                    "Splats made of each anchor")

@@ -27,7 +27,7 @@ constexpr auto kPollInterval = std::chrono::milliseconds(50);
 struct Arguments {
   FitFlags flags;
   SeriesFlags series;
-  std::string dataset, out, report;
+  std::string dataset, out, report, start_from;
   std::optional<int64_t> budget;
   int64_t downscale = 1;
 };
@@ -223,6 +223,17 @@ void removeKeyFrames(const std::string& folder) {
   std::filesystem::remove(folder, none);
 }
 
+Job started(const Context& context, const Arguments& arguments, const Views& views,
+            const StippleFitOptions& options) {
+  const auto* seen = const_cast<const StippleViews*>(views.get());
+  if (arguments.start_from.empty()) {
+    return make<Job>(stipple_fit_start, context.get(), seen, &options);
+  }
+  const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.start_from.c_str());
+  return make<Job>(stipple_fit_start_from, context.get(),
+                   const_cast<const StippleCloud*>(cloud.get()), seen, &options);
+}
+
 void fit(const Context& context, const Arguments& arguments) {
   const std::string checkpoint = arguments.out + ".checkpoint.safetensors";
   const StippleFitOptions options = arguments.flags.options(checkpoint);
@@ -239,9 +250,7 @@ void fit(const Context& context, const Arguments& arguments) {
   // gone.
   const SignalHold hold;
   ignoreClosedPipes();
-  const auto job =
-      make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
-                const_cast<const StippleFitOptions*>(&options));
+  const Job job = started(context, arguments, views, options);
   const bool is_whole = watch(job);
   saveSomewhere(context, job, {arguments.out, budget, options.model, options.seed});
   if (!arguments.report.empty()) {
@@ -272,6 +281,10 @@ void addFit(CLI::App& app, const Context& context) {
       ->required();
   to.flags.addTo(*command);
   to.series.addTo(*command);
+  command->add_option("--start-from", to.start_from,
+                      "The fit begins with these splats, and not with its own: the result of "
+                      "'stipple detail', of another fit or of a cut. In the coordinates of the "
+                      "data set.");
   // While the command line is read: newer releases of CLI11 ask for missing arguments before they
   // call back.
   command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts.")

@@ -119,7 +119,10 @@ ExplicitModelOptions explicitOptions(const FitOptions& options, const ViewSource
 
 std::unique_ptr<FitModel> makeModel(const BackendFactory& backends, const ViewSource& views,
                                     const FitViews& split, const FitOptions& options,
-                                    Progress* progress) {
+                                    const SplatCloud* start, Progress* progress) {
+  if (start != nullptr) {
+    return makeExplicitModel(backends, *start, explicitOptions(options, views));
+  }
   if (options.model == FitKind::kField) {
     return makeFieldModel(backends, views, split.training, fieldOptions(options), progress);
   }
@@ -141,6 +144,33 @@ FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
   return held;
 }
 
+/// In: options: what was asked for; held: after max_bytes.
+void requireStart(const SplatCloud& start, const ViewSource& views, const FitOptions& options,
+                  const FitOptions& held) {
+  if (options.model != FitKind::kExplicit) {
+    fail(ErrorCode::kInvalidArgument,
+         "only a fit of explicit splats that stand still can begin with splats");
+  }
+  if (start.size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "there are no splats to begin with; at least one is needed");
+  }
+  if (start.colour_space != views.colourSpace()) {
+    fail(ErrorCode::kInvalidArgument,
+         "the splats to begin with and the views have different colour spaces; they must be "
+         "composited in one");
+  }
+  const std::string count = "there are " + std::to_string(start.size()) + " splats to begin with; ";
+  if (start.size() > options.max_splats) {
+    fail(ErrorCode::kInvalidArgument, count + "max_splats allows " +
+                                          std::to_string(options.max_splats) +
+                                          ": raise it, or begin with fewer");
+  }
+  if (start.size() > held.max_splats) {
+    fail(ErrorCode::kMemoryLimit,
+         count + "max_bytes has room for " + std::to_string(held.max_splats));
+  }
+}
+
 /// A place that cannot be written to is a note when a checkpoint is: it may be there by then.
 void requireNothingLost(const std::string& checkpoint_path) {
   try {
@@ -153,11 +183,14 @@ void requireNothingLost(const std::string& checkpoint_path) {
 }  // namespace
 
 FitSession::FitSession(std::shared_ptr<const BackendFactory> backends,
-                       std::shared_ptr<const ViewSource> views, const FitOptions& options)
+                       std::shared_ptr<const ViewSource> views, const FitOptions& options,
+                       std::shared_ptr<const SplatCloud> start)
     : backends_(std::move(backends)),
       views_(std::move(views)),
       options_(preparedOptions(options, *views_)),
+      start_(std::move(start)),
       split_(splitAsTold(*views_, options_.holdout)) {
+  if (start_) requireStart(*start_, *views_, options, options_);
   if (!options_.checkpoint_path.empty() && !options_.resume) {
     requireNothingLost(options_.checkpoint_path);
   }
@@ -173,7 +206,7 @@ uint64_t FitSession::memoryBound(const ViewSource& views, const FitOptions& opti
 }
 
 std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
-  const FitSettings settings = settingsOf(options_, *views_);
+  const FitSettings settings = settingsOf(options_, *views_, start_.get());
   settings_json_ = stipple::settingsJson(settings);
   // A checkpoint that does not fit is told before anything is loaded.
   std::optional<Checkpoint> checkpoint;
@@ -187,7 +220,8 @@ std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
   if (options_.model == FitKind::kRelay) noteCut();
   for (const std::string& warning : checkViews(*views_, {}, &progress)) note(warning);
   auto trainer = std::make_unique<Trainer>(
-      *backends_, views_, split_, makeModel(*backends_, *views_, split_, options_, &progress),
+      *backends_, views_, split_,
+      makeModel(*backends_, *views_, split_, options_, start_.get(), &progress),
       trainerOptions(options_));
   if (!checkpoint) return trainer;
   try {

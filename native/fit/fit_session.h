@@ -37,8 +37,13 @@ class FitSession final : public FitObserver {
   /// Holds the options to their memory. Errors: those of requireFitOptions(), holdToMemory() and,
   /// of splats that move, clipOfViews(), and kInvalidArgument where a checkpoint would replace a
   /// file of another kind.
+  /// In: start: splats that it begins with in place of its own, where it is not null. Errors of
+  /// those: kInvalidArgument for another model than explicit splats that stand still, none, another
+  /// colour space than the views have, and more than max_splats; kMemoryLimit for more than
+  /// max_bytes has room for.
   FitSession(std::shared_ptr<const BackendFactory> backends,
-             std::shared_ptr<const ViewSource> views, const FitOptions& options);
+             std::shared_ptr<const ViewSource> views, const FitOptions& options,
+             std::shared_ptr<const SplatCloud> start = nullptr);
 
   /// About what run() allocates, bytes.
   uint64_t memoryBound() const;
@@ -92,6 +97,7 @@ class FitSession final : public FitObserver {
   std::shared_ptr<const BackendFactory> backends_;
   std::shared_ptr<const ViewSource> views_;
   FitOptions options_;  ///< resolved, held to their memory
+  std::shared_ptr<const SplatCloud> start_;
   FitViews split_;
   std::string settings_json_;
   std::unique_ptr<Trainer> trainer_;

@@ -1,6 +1,7 @@
 #include "fit/fit_settings.h"
 
 #include <cstdio>
+#include <vector>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -13,6 +14,7 @@ namespace {
 
 constexpr const char* kViewCount = "views";
 constexpr const char* kViewsKey = "views_key";
+constexpr const char* kStartKey = "start_key";
 
 std::string exact(double value) {
   char text[40];
@@ -29,13 +31,31 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
+void mixBytes(uint64_t& key, const void* bytes, size_t count) {
+  const auto* from = static_cast<const unsigned char*>(bytes);
+  for (size_t i = 0; i < count; ++i) key = mixBits(key ^ from[i]);
+}
+
+std::string keyText(uint64_t key) {
+  char text[24];
+  std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(key));
+  return text;
+}
+
+/// Tells clouds apart by all their numbers.
+uint64_t keyOf(const SplatCloud& cloud) {
+  uint64_t key = cloud.size();
+  for (const std::vector<float>* values :
+       {&cloud.positions, &cloud.rotations, &cloud.scales, &cloud.opacities, &cloud.sh}) {
+    mixBytes(key, values->data(), values->size() * sizeof(float));
+  }
+  return key;
+}
+
 /// Tells sets of views apart by their names, cameras and times.
 uint64_t keyOf(const ViewSource& views) {
   uint64_t key = views.count();
-  const auto mix = [&key](const void* bytes, size_t count) {
-    const auto* from = static_cast<const unsigned char*>(bytes);
-    for (size_t i = 0; i < count; ++i) key = mixBits(key ^ from[i]);
-  };
+  const auto mix = [&key](const void* bytes, size_t count) { mixBytes(key, bytes, count); };
   for (size_t v = 0; v < views.count(); ++v) {
     const std::string name = views.name(v);
     const Camera& camera = views.camera(v);
@@ -75,10 +95,10 @@ std::string textOf(const FlatJsonValue& value) {
 
 }  // namespace
 
-FitSettings settingsOf(const FitOptions& options, const ViewSource& views) {
-  char key[24];
-  std::snprintf(key, sizeof(key), "%016llx", static_cast<unsigned long long>(keyOf(views)));
-  return {options, views.count(), key};
+FitSettings settingsOf(const FitOptions& options, const ViewSource& views,
+                       const SplatCloud* start) {
+  return {options, views.count(), keyText(keyOf(views)),
+          start == nullptr ? std::string() : keyText(keyOf(*start))};
 }
 
 std::string settingsJson(const FitSettings& settings) {
@@ -93,6 +113,7 @@ std::string settingsJson(const FitSettings& settings) {
   }
   add(kViewCount, std::to_string(settings.view_count));
   add(kViewsKey, quoted(settings.views_key));
+  if (!settings.start_key.empty()) add(kStartKey, quoted(settings.start_key));
   return text + "}";
 }
 
@@ -106,6 +127,8 @@ FitSettings readSettings(const std::string& json) {
         settings.view_count = std::get<uint64_t>(value);
       } else if (name == kViewsKey) {
         settings.views_key = text;
+      } else if (name == kStartKey) {
+        settings.start_key = text;
       } else {
         double unit = 1;
         const FitOption* option = findFitOption(name, &unit);
@@ -146,6 +169,12 @@ void requireSameSettings(const std::string& stored_json, const FitSettings& want
   if (stored.views_key != wanted.views_key) {
     fail(ErrorCode::kInvalidArgument,
          path + " is of a fit to other views; resuming needs the same cameras and names");
+  }
+  if (stored.start_key != wanted.start_key) {
+    const std::string began =
+        stored.start_key.empty() ? "without splats to begin with" : "with other splats";
+    fail(ErrorCode::kInvalidArgument,
+         path + " is of a fit that began " + began + "; resuming needs the same");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "data/clouds/splat_cloud.h"
 #include "data/views/view_source.h"
 #include "fit/fit_options.h"
 
@@ -13,10 +14,12 @@ struct FitSettings {
   FitOptions options;  ///< resolved; what is not stored has its default
   uint64_t view_count = 0;
   std::string views_key;  ///< of their names and cameras
+  std::string start_key = {};  ///< of the splats that it begins with; empty: it makes its own
 };
 
-/// In: options: resolved.
-FitSettings settingsOf(const FitOptions& options, const ViewSource& views);
+/// In: options: resolved; start: the splats that the fit begins with, or null.
+FitSettings settingsOf(const FitOptions& options, const ViewSource& views,
+                       const SplatCloud* start = nullptr);
 
 /// As a flat JSON object, with the table's options in its order.
 std::string settingsJson(const FitSettings& settings);

@@ -204,6 +204,48 @@ def test_export_of_a_selection_a_collection_and_all_that_is_visible(stipple, tmp
                                atol=1e-5)
 
 
+def test_usd_keeps_objects_and_has_shared_splats_once(stipple, tmp_path):
+    write_ply(stipple, tmp_path / 'tree.ply', make_arrays(stipple, count=3000, degree=1))
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'tree.ply'))
+    tree = bpy.context.object
+    twins = [tree]
+    for i in range(3):
+        twin = tree.copy()  # as Alt D: the splats are shared
+        twin.matrix_world = Matrix.Translation((4 * i, 1, 0)) @ Euler((0.3, 0.2 * i, 1)).to_matrix().to_4x4()
+        bpy.context.scene.collection.objects.link(twin)
+        twins.append(twin)
+    bpy.context.view_layer.update()
+    scenes.select(*twins)
+    kept, one, ply = (tmp_path / name for name in ('kept.usda', 'one.usda', 'all.ply'))
+    for path, options in ((kept, {}), (one, {'keep_objects': False}), (ply, {})):
+        assert bpy.ops.stipple.splats_export(filepath=str(path), up_axis='Z', **options) == {'FINISHED'}
+    text = kept.read_text()
+    assert text.count('point3f[] positions') == 1 and one.read_text().count('point3f[] positions') == 1
+    assert text.count('instanceable = true') == 4 and 'def Xform "tree_001"' in text
+    assert 3.5 * kept.stat().st_size < one.stat().st_size
+    joined, apart = load(stipple, ply), load(stipple, kept)
+    assert apart.count == joined.count == 12000
+    np.testing.assert_allclose(apart.positions, joined.positions, atol=1e-5)
+    np.testing.assert_allclose(apart.sh, joined.sh, atol=1e-5)
+    np.testing.assert_allclose(apart.scales, joined.scales, rtol=1e-4)
+    # It comes back to where it was.
+    assert bpy.ops.stipple.splats_import(filepath=str(kept)) == {'FINISHED'}
+    there = stipple.scene.source.splat_data.read(bpy.context.object.data)
+    world = np.array(bpy.context.object.matrix_world)
+    np.testing.assert_allclose(there.positions @ world[:3, :3].T + world[:3, 3], joined.positions, atol=1e-5)
+
+    class Settings:
+        collection, use_selection, budget, max_degree, filepath = '', True, 'VIEWPORT', 3, str(kept)
+        ascii = half = False
+        keep_objects = True
+    scenes.select(*twins)
+    shown = stipple.scene.source.exporting.size_label(bpy.context, Settings)
+    megabytes = float(shown.split('about ')[1].split()[0])
+    assert shown.startswith('12,000 splats') and abs(megabytes - kept.stat().st_size / 1e6) < 0.1 * megabytes
+    Settings.keep_objects = False
+    assert float(stipple.scene.source.exporting.size_label(bpy.context, Settings).split('about ')[1].split()[0]) > 3 * megabytes
+
+
 def test_budgets_of_an_export(stipple, tmp_path):
     obj = scenes.make_splats(scenes.quad(), anchors=100, source_path=str(tmp_path / 'a.stipple.safetensors'))
     obj.data.stipple.anchors_render = 250
@@ -225,7 +267,7 @@ def test_the_size_is_estimated_well(stipple, tmp_path):
 
     class Settings:
         collection, use_selection, budget, max_degree, filepath = '', True, 'VIEWPORT', 3, 'x.ply'
-        ascii = half = False
+        ascii = half = keep_objects = False
     assert exporting.size_label(bpy.context, Settings) == '20,000 splats, about 5.0 MB'
     Settings.filepath = 'x.compressed.ply'
     assert exporting.size_label(bpy.context, Settings) == '20,000 splats, about 1.2 MB'

@@ -93,6 +93,29 @@ def test_the_same_fit_twice_gives_the_same_splats(stipple, ball, tmp_path):
     assert np.array_equal(first.positions, again.positions) and np.array_equal(first.sh, again.sh)
 
 
+def test_a_fit_begins_with_the_splats_of_an_object(stipple, ball, fitting):
+    def psnr(**values):
+        settings(**values)
+        scenes.select(ball)
+        assert bpy.ops.stipple.splats_fit() == {'FINISHED'}
+        return fitting.state.figures.best_psnr
+
+    anew = psnr(max_splats=300)
+    start = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
+    start.name, count = 'Start', len(stipple.scene.source.splat_data.read(start.data).positions)
+    on = psnr(begin_with=start)
+    assert on > anew + 0.5
+    assert len(stipple.scene.source.splat_data.read(start.data).positions) == count  # it stays as it was
+    # It begins with them where they are shown.
+    start.location = 2, 0, 0
+    bpy.context.view_layer.update()
+    assert psnr() < on - 0.5
+    settings(max_splats=100)
+    scenes.refuses(bpy.ops.stipple.splats_fit, "'Start', which the fit begins with, has ")
+    bpy.data.objects.remove(start)
+    assert bpy.context.scene.stipple.fit.begin_with is None
+
+
 def test_a_field_decodes_at_any_budget(stipple, ball):
     settings(model='FIELD', view_count=6, view_size=32, max_splats=10_000)
     obj = fitted()

@@ -99,6 +99,43 @@ def test_begins_with_as_many_splats_as_asked(dataset, tmp_path):
     assert json.loads(run('info', tmp_path / 'out.ply', '--json').stdout)['count'] == 70
 
 
+def test_begins_with_splats_of_a_file(dataset, tmp_path):
+    coarse = tmp_path / 'coarse.ply'
+    first = run('fit', dataset, coarse, '--iterations', 300, '--gaussians', 60, '--start', 60, '--holdout', 6)
+    steps = ('--iterations', 1, '--gaussians', 300, '--holdout', 6)
+    before, anew, on = (float(figures(result.stdout)['held_out_psnr']) for result in (
+        first, run('fit', dataset, tmp_path / 'anew.ply', *steps),
+        run('fit', dataset, tmp_path / 'on.ply', *steps, '--start-from', coarse)))
+    assert on > anew + 1 and abs(on - before) < 0.5  # it goes on from where 300 steps were
+    run('fit', dataset, tmp_path / 'same.ply', '--iterations', 1, '--gaussians', 300, '--start-from', coarse)
+    counts = [json.loads(run('info', path, '--json').stdout)['count'] for path in (coarse, tmp_path / 'same.ply')]
+    assert counts[0] == counts[1] > 40
+    # Stopped, it goes on from the same splats alone.
+    out = tmp_path / 'stopped.ply'
+    process = subprocess.Popen([TOOL, 'fit', dataset, out, '--iterations', '200000', '--gaussians', '300',
+                                '--start-from', coarse, '--checkpoint-interval', '10'], stderr=subprocess.DEVNULL)
+    checkpoint, deadline = tmp_path / 'stopped.ply.checkpoint.safetensors', time.monotonic() + 60
+    while not checkpoint.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    again = ('fit', dataset, out, '--iterations', 200000, '--gaussians', 300, '--resume')
+    assert 'began with other splats' in error(*again)
+    assert 'began with other splats' in error(*again, '--start-from', tmp_path / 'on.ply')
+
+
+@pytest.mark.parametrize('flags, words', [
+    (('--model', 'field'), 'only a fit of explicit splats'), (('--gaussians', 20), 'there are 120 splats to begin with'),
+    (('--memory', 1, '--sh-degree', 4, '--gaussians', 5000), 'max_bytes has room for'),
+    (('--start-from', 'nothing.ply'), 'nothing.ply')], ids=['model', 'more than allowed', 'memory', 'no file'])
+def test_a_start_that_does_not_fit_is_refused(dataset, tmp_path, flags, words):
+    start = tmp_path / 'start.ply'
+    run('decode', dataset / 'truth.ply', start, '--anchors', 120)
+    steps = ('fit', dataset, tmp_path / 'out.ply', '--iterations', 5)
+    assert words in error(*steps, *flags, *(() if '--start-from' in flags else ('--start-from', start)))
+    assert not (tmp_path / 'out.ply').exists()
+
+
 def test_memory_holds_the_count(dataset, tmp_path):
     steps = ('--iterations', 300, '--sh-degree', 0, '--strategy', 'adaptive(threshold=1e-9)')
     free, held = (int(figures(run('fit', dataset, tmp_path / f'{name}.ply', *steps, *more).stdout)['gaussians'])

@@ -163,6 +163,11 @@ def test_splats_come_down_to_any_share_of_themselves(scene):
     assert figures('info', scene / 'usual.ply')['count'] == 5000
     run('decode', scene / 'tree.stipple.safetensors', scene / 'refined.ply', '--anchors', 100, '--refine', 2)
     assert figures('info', scene / 'refined.ply')['count'] == 100
+    cut, timed = scene / 'cut.ply', scene / 'timed.ply'
+    run('decode', scene / 'tree.stipple.safetensors', cut, '--anchors', 100)
+    run('decode', scene / 'tree.stipple.safetensors', timed, '--anchors', 100, '--refine-seconds', 3)
+    assert figures('info', timed)['count'] == 100 and timed.read_bytes() != cut.read_bytes()
+    assert '--refine-seconds is 0' in error('decode', scene / 'tree.stipple.safetensors', timed, '--refine-seconds', 0)
     for ratio in (1.5, 0, -0.1, 'nan'):
         assert '0 and up to 1' in error('decode', scene / 'cube.ply', scene / 'never.ply', '--ratio', ratio)
     assert '5000' in error('decode', scene / 'cube.ply', scene / 'never.ply', '--anchors', 5001)

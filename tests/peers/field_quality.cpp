@@ -19,6 +19,7 @@
 #include "decode/tree/hierarchy_decoder.h"
 #include "decode/tree/merge_tree.h"
 #include "io/views/dataset.h"
+#include "model/field_splats.h"
 #include "train/loop/explicit_model.h"
 #include "train/loop/field_model.h"
 #include "train/loop/trainer.h"
@@ -29,7 +30,7 @@ namespace {
 constexpr uint64_t kHoldOut = 6;
 /// Fits that are compared.
 const std::string kField = "field", kGradientOff = "gradient off", kJitterOff = "jitter off",
-                  kCut = "explicit cut";
+                  kCut = "explicit cut", kOtherSeed = "another seed";
 
 struct Settings {
   uint64_t iterations, seeds, least, most;
@@ -71,7 +72,17 @@ class Scene {
     trainer.run(nobody);
     Curve curve;
     for (const FitMeasure& measure : trainer.history().by_budget) curve.push_back(measure.psnr);
+    other_seeds_[seed] = decodedAnew(trainer.model());
     return curve;
+  }
+
+  /// The last fit of this seed, decoded with another one: the mean of four.
+  const Curve& otherSeeds(uint64_t seed) const {
+    const auto found = other_seeds_.find(seed);
+    if (found == other_seeds_.end()) {
+      throw std::invalid_argument("'" + kOtherSeed + "' comes after '" + kField + "'");
+    }
+    return found->second;
   }
 
   /// Of explicit splats, as many as the largest budget has at most, cut by their merge tree.
@@ -106,6 +117,27 @@ class Scene {
   }
 
  private:
+  Curve decodedAnew(FitModel& fitted) const {
+    const FieldResult learned = *fieldResult(fitted);
+    const auto model = makeFieldSplats(std::make_shared<const OctreeDensity>(learned.density),
+                                       learned.field, learned.draws);
+    PictureStore pictures(views_, uint64_t{1} << 30);
+    ViewMeasure judge(*cpuBackends());
+    const double black[3] = {0, 0, 0};
+    Curve curve(settings_.budgets().size(), 0.0);
+    for (size_t b = 0; b < curve.size(); ++b) {
+      for (const uint64_t seed : {1, 2, 3, 4}) {
+        ModelRequest request;
+        request.budget = settings_.budgets()[b];
+        request.gaussians_per_anchor = settings_.gaussians;
+        request.seed = seed;
+        const SplatCloud cloud = model->decode(request);
+        curve[b] += judge.measure(cloud, pictures, split_.held_out, black).psnr / 4;
+      }
+    }
+    return curve;
+  }
+
   TrainerOptions trainerOptions(uint64_t seed) const {
     TrainerOptions options;
     options.iterations = settings_.iterations;
@@ -116,6 +148,7 @@ class Scene {
   Settings settings_;
   std::shared_ptr<const ViewSource> views_;
   FitViews split_;
+  mutable std::map<uint64_t, Curve> other_seeds_;  ///< of the last field of each seed
 };
 
 void print(const std::string& name, const Curve& curve) {
@@ -167,8 +200,9 @@ Curve curveOf(const Scene& scene, const std::string& arm, uint64_t seed) {
   if (arm == kGradientOff) return scene.field(seed, false, true);
   if (arm == kJitterOff) return scene.field(seed, true, false);
   if (arm == kCut) return scene.cuts(seed);
+  if (arm == kOtherSeed) return scene.otherSeeds(seed);
   throw std::invalid_argument("'" + arm + "' is not one of " + kField + ", " + kGradientOff + ", " +
-                              kJitterOff + ", " + kCut);
+                              kJitterOff + ", " + kCut + ", " + kOtherSeed);
 }
 
 /// What is asked for, parted by commas.
@@ -210,6 +244,7 @@ void run(const Settings& settings, uint32_t downscale, const std::vector<std::st
   compare("gradient on - off", kGradientOff);
   compare("jitter on - off", kJitterOff);
   compare("field - explicit cut", kCut);
+  compare("own seed - another", kOtherSeed);
 }
 
 }  // namespace

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .errors import invalid
+from .errors import check, invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
 from .job import Job
 from .structs import (Antialias, ColourSpace, Frame, SplatQuantity, StippleCloudArrays, StippleCloudBuffers,
                       StippleCloudColumnBuffers, StippleCloudColumns, StippleCloudComparison, StippleCloudInfo,
-                      StippleCloudSaveOptions)
+                      StippleCloudSaveOptions, StippleSceneObject)
 
 # Floats of a splat in each attribute that Blender stores. 'base' is the harmonics of degree 0 and the opacity; those
 # above are columns of their own, named by number from 0 on.
@@ -226,3 +226,16 @@ class Cloud(Handle):
         result = StippleCloudComparison()
         self._check(self.library.stipple_cloud_compare(self.pointer, other.pointer, byref(result)))
         return result
+
+
+def save_scene(objects, path, matrices_lead_to=Frame.UNKNOWN, **options_given):
+    """Writes [(name, cloud, 4x4 matrix)] as prims of a USD layer or package; splats that several objects show are in
+    the file once. matrices_lead_to: a frame; options_given: as Cloud.save has them."""
+    if not objects:
+        raise invalid('There is nothing to write; at least one object is needed.')
+    library = objects[0][1].library
+    array = (StippleSceneObject * len(objects))()
+    for entry, (name, cloud, matrix) in zip(array, objects):
+        entry.__init__(name_utf8=name.encode(), cloud=cloud.pointer, matrix=matrix16(matrix))
+    options = save_options(library, **options_given)
+    check(library, library.stipple_scene_save(array, len(objects), int(matrices_lead_to), path_bytes(path), byref(options)))

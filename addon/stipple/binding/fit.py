@@ -93,9 +93,13 @@ class Fit(Job):
     """A fit that runs; a cancelled or failed one still has the best that it had measured."""
 
     @classmethod
-    def start(cls, context, views, options):
-        return cls(context.library, new_handle(context.library, 'stipple_fit_start', context.pointer, views.pointer,
-                                               byref(options)))
+    def start(cls, context, views, options, cloud=None):
+        """cloud: the splats that it begins with, in the coordinates of the views; None: its own."""
+        if cloud is None:
+            return cls(context.library, new_handle(context.library, 'stipple_fit_start', context.pointer,
+                                                   views.pointer, byref(options)))
+        return cls(context.library, new_handle(context.library, 'stipple_fit_start_from', context.pointer,
+                                               cloud.pointer, views.pointer, byref(options)))
 
     def figures(self):
         """StippleFitFigures as they are now; psnr is NaN until held-out views were measured. Never waits."""

@@ -177,7 +177,8 @@ class StippleModelFromCloudOptions(_Sized):
 
 class StippleRefineOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('iterations', c_uint32), ('view_count', c_uint32),
-                ('view_size', c_uint32), ('view_rig', c_uint32), ('reserved', c_uint32), ('seed', c_uint64)]
+                ('view_size', c_uint32), ('view_rig', c_uint32), ('reserved', c_uint32), ('seed', c_uint64),
+                ('seconds', c_double)]
 
 
 class StippleModelInfo(_Sized):
@@ -246,6 +247,11 @@ class StippleViewBuffers(_Sized):
 class StippleInstance(_Sized):
     _fields_ = [('struct_size', c_uint32), ('holdout', c_uint32), ('cloud', c_void_p), ('matrix', _matrix),
                 ('grade', POINTER(StippleGrade)), ('time', c_double)]
+
+
+class StippleSceneObject(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('name_utf8', c_char_p), ('cloud', c_void_p),
+                ('matrix', _matrix)]
 
 
 class StippleAccuracy(_Sized):

@@ -9,7 +9,7 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..binding.cloud import Cloud, SplatArrays
+from ..binding.cloud import Cloud, SplatArrays, save_scene
 from ..binding.errors import invalid
 from ..binding.series_writer import SeriesWriter
 from ..jobs import JobOperator, Task
@@ -98,6 +98,9 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
                            "and not each to a file of its own (.usda, .usd, .usdz)", default=True)
     ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
 
+    keep_objects: BoolProperty(name="Keep Objects", description="Write each object as a prim with its own name and "
+                               "transform, and splats that several objects share once; otherwise all splats become one "
+                               "prim (.usda, .usd, .usdz)", default=True)
     half: BoolProperty(name="Half Precision", description="Write all but the positions in half precision, about a quarter "
                        "smaller (.usda, .usd, .usdz)", default=False)
 
@@ -131,10 +134,17 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             return self._start_series(context, objects, OneFile(context, path, options))
         if self.frames != 'CURRENT':
             return self._start_series(context, objects, FileEach(path, options))
+        keeps_objects = form.holds_times and self.keep_objects and len(objects) > 1
         clouds = exporting.placed_clouds(context, objects, self.budget, self.apply_transform,
                                          self.apply_grade)
+        names = [obj.name for obj in objects]
 
         def work(task):
+            if keeps_objects:
+                task.advance(0.0, 'Writing splats')
+                placed, frame = clouds
+                save_scene([(name, *one) for name, one in zip(names, placed)], path, frame, **options)
+                return sum(cloud.info().count for cloud, _matrix in placed)
             task.advance(0.0, 'Joining splats')
             cloud = exporting.joined(clouds)
             task.advance(0.3, 'Writing splats')
@@ -179,6 +189,8 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         is_usd = form is not None and form.holds_times
         if self.frames != 'CURRENT' and is_usd:
             layout.prop(self, 'one_file')
+        elif is_usd:
+            layout.prop(self, 'keep_objects')
         layout.prop(self, 'apply_transform')
         row = layout.row()
         row.enabled = self.apply_transform

@@ -72,6 +72,8 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
             layout.prop(settings, 'key_frame_spacing')
         elif settings.model != 'SCAFFOLD':
             _draw_strategy(layout, context, settings)
+        if settings.model == 'EXPLICIT':
+            layout.prop(settings, 'begin_with')
         layout.prop(settings, 'seed')
         layout.prop(settings, 'report')
         layout.prop(settings, 'checkpoint')

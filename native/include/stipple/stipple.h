@@ -272,6 +272,23 @@ void stipple_cloud_save_options_init(StippleCloudSaveOptions* options);
 StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf8,
                                  const StippleCloudSaveOptions* options);
 
+/* An object of a scene that stipple_scene_save writes. */
+typedef struct StippleSceneObject {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const char* name_utf8; /* any; names of prims are made of it, and are unique */
+  const StippleCloud* cloud;
+  double matrix[16]; /* from the cloud to the scene; invertible */
+} StippleSceneObject;
+/* Writes objects [count >= 1] into one USD layer or package, each as a prim with its name and its transformation, with
+ * the numbers that its cloud has. Splats that several of them show, the same cloud or equal ones, are in the file once,
+ * and the objects are instances of them. In: frame: StippleFrame that the matrices lead to; options as of
+ * stipple_cloud_save, or NULL. stipple_cloud_load joins them.
+ * Errors: INVALID_ARGUMENT for a matrix that is singular or not affine; UNSUPPORTED for paths of other formats, clouds
+ * without splats, several colour spaces or low-pass filters; IO. */
+StippleStatus stipple_scene_save(const StippleSceneObject* objects, uint64_t count, uint32_t frame,
+                                 const char* path_utf8, const StippleCloudSaveOptions* options);
+
 /* Writes clouds as the levels of one streamed SOG scene: a file for each level and chunk of space, and
  * path_utf8, a lod-meta.json in a folder that is there. In: levels [level_count >= 1], finest first, of one
  * colour space, filter and frame; environment, drawn at every level, or NULL; options as of stipple_cloud_save,
@@ -792,13 +809,15 @@ typedef struct StippleRefineOptions {
   uint32_t view_rig;    /* StippleViewRig, default automatic */
   uint32_t reserved;
   uint64_t seed;        /* of the views */
+  double seconds;       /* it ends after these, with as many of the iterations as fit, by this machine's clock; 0, the
+                           default: it takes all of them */
 } StippleRefineOptions;
 void stipple_refine_options_init(StippleRefineOptions* options);
 
 /* Fits a reduced cloud (a decoded model) to images of the full one, as a job (stipple_job_cloud): positions,
  * rotations, scales, opacities and harmonics change; the count and the order stay. The result is the same for any
- * number of threads.
- * Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space; MEMORY_LIMIT before anything is
+ * number of threads, but where seconds decide how many steps there are.
+ * Errors: INVALID_ARGUMENT for options out of range, an empty cloud or clouds of different colour space; MEMORY_LIMIT before anything is
  * allocated, where the images (12 bytes per pixel of every view) and the passes would need more than the context's
  * limit.
  * Cost: one drawing of `full` per view, one drawing and one backward pass of `cloud` per iteration. */
@@ -2159,6 +2178,13 @@ typedef struct StippleFitFigures {
  * and resumed in between. docs/methods/fitting.md. */
 StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* views, const StippleFitOptions* options,
                                 StippleJob** job);
+/* The same of explicit splats that stand still, beginning with the splats of a cloud instead of its own: all that the
+ * steps do to them, density control included, begins from there. In: cloud: in the coordinates and the colour space of
+ * the views; its harmonics are cut or filled up to sh_degree. start_splats counts for nothing. Errors of the start: as
+ * above; INVALID_ARGUMENT for another model, a cloud without splats or with more than max_splats, another colour space;
+ * MEMORY_LIMIT for more than max_bytes has room for. With resume, INVALID_ARGUMENT for a checkpoint of another start. */
+StippleStatus stipple_fit_start_from(StippleContext* context, const StippleCloud* cloud, const StippleViews* views,
+                                     const StippleFitOptions* options, StippleJob** job);
 /* Estimates the bytes that a fit allocates: images up to image_bytes, the model at its largest, its best state
  * and a checkpoint. */
 StippleStatus stipple_fit_memory_bound(const StippleViews* views, const StippleFitOptions* options,

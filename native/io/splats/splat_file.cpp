@@ -1,7 +1,6 @@
 #include "io/splats/splat_file.h"
 
 #include <algorithm>
-#include <cstring>
 #include <deque>
 #include <filesystem>
 #include <optional>
@@ -9,7 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/parallel.h"
+#include "data/clouds/sh_degree.h"
 #include "data/clouds/splat_colour.h"
 #include "io/bytes/input_file.h"
 #include "io/splats/sog_levels.h"
@@ -17,8 +16,6 @@
 namespace stipple {
 
 namespace {
-
-constexpr size_t kGrain = 4096;
 
 /// "3DGS PLY (.ply), SPZ (.spz) and ..." of the formats that can be read (or written).
 std::string listOfFormats(bool written) {
@@ -33,29 +30,6 @@ std::string listOfFormats(bool written) {
     text += parts[i];
   }
   return text;
-}
-
-/// A copy with harmonics up to a degree.
-SplatCloud copyOf(const SplatCloud& cloud, int degree) {
-  if (cloud.sh_degree <= degree) return cloud;
-  SplatCloud copy;
-  copy.sh_degree = degree;
-  copy.colour_space = cloud.colour_space;
-  copy.antialias = cloud.antialias;
-  copy.frame = cloud.frame;
-  copy.positions = cloud.positions;
-  copy.rotations = cloud.rotations;
-  copy.scales = cloud.scales;
-  copy.opacities = cloud.opacities;
-  const size_t before = cloud.shStride();
-  const size_t after = copy.shStride();
-  copy.sh.resize(cloud.size() * after);
-  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      std::memcpy(&copy.sh[i * after], &cloud.sh[i * before], after * sizeof(float));
-    }
-  });
-  return copy;
 }
 
 /// What a cloud needs before a format takes it.
@@ -85,7 +59,7 @@ Changes changesFor(const SplatCloud& cloud, const SplatFormat& format,
 /// The cloud as a format takes it, where that differs from the cloud as it is. In: a valid cloud.
 std::optional<SplatCloud> prepared(const SplatCloud& cloud, const Changes& changes) {
   if (!changes.any()) return std::nullopt;
-  SplatCloud copy = copyOf(cloud, changes.degree);
+  SplatCloud copy = withShDegree(cloud, std::min(cloud.sh_degree, changes.degree));
   if (changes.recolours) convertColours(copy, ColourSpace::kDisplay);
   if (changes.turns) convertFrame(copy, changes.frame);
   return copy;

@@ -74,13 +74,18 @@ void requireHalves(const SplatCloud& cloud, const std::string& path) {
   }
 }
 
+std::string usdMetadata(Frame frame, const std::string& prim, const std::string& times) {
+  return "#usda 1.0\n(\n    defaultPrim = \"" + prim +
+         "\"\n    doc = \"Written by Stipple\"\n    metersPerUnit = 1\n" + times +
+         "    upAxis = \"" + (frame == kUsdFrameOfZUp ? "Z" : "Y") + "\"\n)\n";
+}
+
 std::string usdLayerHead(const SplatCloud& like, const std::string& times) {
-  std::string text =
-      "#usda 1.0\n(\n    defaultPrim = \"Splats\"\n    doc = \"Written by Stipple\"\n"
-      "    metersPerUnit = 1\n" +
-      times + "    upAxis = \"";
-  text += like.frame == kUsdFrameOfZUp ? 'Z' : 'Y';
-  text += "\"\n)\n\ndef " + std::string(kUsdSplats) + " \"Splats\"";
+  return usdMetadata(like.frame, "Splats", times) + "\n" + usdPrimHead(like, "Splats");
+}
+
+std::string usdPrimHead(const SplatCloud& like, const std::string& name) {
+  std::string text = "def " + std::string(kUsdSplats) + " \"" + name + "\"";
   std::string custom;
   if (like.antialias == Antialias::kMip) addCustom(kUsdAntialiasKey, kUsdMip, custom);
   if (like.frame != kUsdFrame && like.frame != kUsdFrameOfZUp) {

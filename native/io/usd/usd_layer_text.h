@@ -31,8 +31,15 @@ std::array<UsdArray, 5> usdArrays(int sh_degree, bool halves);
 /// Errors: kUnsupported.
 void requireHalves(const SplatCloud& cloud, const std::string& path);
 
-/// The layer up to the attributes with values for each splat. In: like, whose frame, colour space,
-/// filter and degree the layer has; times, lines of the layer's metadata.
+/// The first lines of a layer. In: frame, whose up axis the layer has; prim, the name of the first
+/// one; times, lines of the layer's metadata.
+std::string usdMetadata(Frame frame, const std::string& prim, const std::string& times);
+
+/// A prim of splats up to the attributes with values for each splat. In: like, whose frame, colour
+/// space, filter and degree it has.
+std::string usdPrimHead(const SplatCloud& like, const std::string& name);
+
+/// Both, for a layer of one prim.
 std::string usdLayerHead(const SplatCloud& like, const std::string& times);
 
 /// "[(...), (...)]": corners of a box with all splats, whichever way they are turned.

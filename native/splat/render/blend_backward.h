@@ -24,6 +24,7 @@ enum class BackwardMode : uint32_t {
   kGradients = 0,
   kContributions = 1,  ///< and leave-one-out contributions
   kStatistics = 2,     ///< and every other statistic
+  kEdges = 3,          ///< and edge weights alone, which many steps of a fit ask for; without depth
 };
 
 struct BackwardWants {
@@ -46,6 +47,8 @@ enum BackwardField : size_t {
   kFieldGreen,
   kFieldBlue,
   kGradientFieldCount,
+  kFieldEdgeAlone = kGradientFieldCount,
+  kEdgeFieldCount,
   kFieldContribution = kGradientFieldCount,
   kContributionFieldCount,
   kFieldWeight = kContributionFieldCount,
@@ -65,6 +68,7 @@ enum BackwardField : size_t {
 /// Of the sums before dL/d(depth of the splat), which comes last where it is wanted.
 constexpr size_t fieldCountOf(BackwardMode mode) {
   return mode == BackwardMode::kGradients       ? kGradientFieldCount
+         : mode == BackwardMode::kEdges         ? kEdgeFieldCount
          : mode == BackwardMode::kContributions ? kContributionFieldCount
                                                 : kStatisticsFieldCount;
 }
@@ -152,6 +156,10 @@ void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardWan
   sums[kFieldG11] += s * splat.g1 * splat.g1;
   for (size_t c = 0; c < 3; ++c) sums[kFieldRed + c] += weight * loss.gradient[c];
   if (wants.mode == BackwardMode::kGradients) return;
+  if (wants.mode == BackwardMode::kEdges) {
+    sums[kFieldEdgeAlone] += weight * loss.edge;
+    return;
+  }
 
   // w (|R| - |R - dC|) per channel without cancellation: with x = w sign(R) dC it is
   // min(x, 2 w |R| - x), so -w |dC| <= result <= w |R|.

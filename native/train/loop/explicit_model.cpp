@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/stopwatch.h"
+#include "data/clouds/sh_degree.h"
 #include "densify/strategies.h"
 #include "train/loop/backend_control.h"
 #include "train/loop/moving_splats.h"
@@ -41,8 +42,11 @@ class ExplicitModel final : public FitModel, private Regulariser {
  public:
   ExplicitModel(const BackendFactory& backends, const SplatCloud& start,
                 const StartMoments& moments, std::unique_ptr<Strategy> strategy,
-                const ExplicitModelOptions& options, bool begins)
-      : strategy_(std::move(strategy)), options_(options), backend_(backends.makeRenderBackend()) {
+                const ExplicitModelOptions& options, bool begins, int least_degree = 0)
+      : strategy_(std::move(strategy)),
+        options_(options),
+        backend_(backends.makeRenderBackend()),
+        least_degree_(least_degree) {
     backend_->upload(start);
     if (begins) prepare();
     step_options_.extra_rates = beginControl(*backend_, *strategy_);
@@ -202,7 +206,8 @@ class ExplicitModel final : public FitModel, private Regulariser {
     std::copy_n(view.background, 3, options.background);
     const uint64_t degree = moment_.iteration / scaleSchedule(kDegreeInterval, moment_.iterations);
     options.sh_degree_limit =
-        static_cast<int>(std::min<uint64_t>(degree, static_cast<uint64_t>(kMaxShDegree)));
+        std::max(least_degree_,
+                 static_cast<int>(std::min<uint64_t>(degree, static_cast<uint64_t>(kMaxShDegree))));
     return options;
   }
 
@@ -252,6 +257,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
   FitMoment moment_;  ///< of the step under way
   TrainingView view_under_way_;
   double transmittance_weight_ = 0;  ///< of the step under way
+  int least_degree_;                 ///< of harmonics that are drawn from the first step on
 };
 
 }  // namespace
@@ -284,6 +290,19 @@ std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, cons
   return std::make_unique<ExplicitModel>(backends, begin.splats,
                                          StartMoments{begin.times, begin.lives},
                                          std::move(strategy), options, true);
+}
+
+std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,
+                                            const ExplicitModelOptions& options) {
+  requireOptions(options);
+  if (start.size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "there are no splats to begin with; at least one is needed");
+  }
+  SplatCloud begin = withShDegree(start, options.sh_degree);
+  begin.antialias = options.antialias;
+  return std::make_unique<ExplicitModel>(backends, begin, StartMoments(),
+                                         makeStrategy(options.strategy), options, false,
+                                         std::min(start.sh_degree, options.sh_degree));
 }
 
 std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,

@@ -47,8 +47,14 @@ std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, cons
                                             const ExplicitModelOptions& options,
                                             Progress* progress = nullptr);
 
-/// The same from splats that are there, with a strategy of the caller's; of options start_splats
-/// counts for nothing, and the seed for the moments of splats that move alone.
+/// The same from splats that are there, which the strategy does not make fainter or smaller first.
+/// They get options.sh_degree, as far as they have it drawn from the first step on, and are made
+/// for options.antialias; options.start_splats counts for nothing.
+std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,
+                                            const ExplicitModelOptions& options);
+
+/// The same with a strategy of the caller's; of options the strategy counts for nothing either, and
+/// the seed for the moments of splats that move alone.
 std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,
                                             std::unique_ptr<Strategy> strategy,
                                             const ExplicitModelOptions& options);

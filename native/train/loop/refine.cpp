@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "data/clouds/cloud_extent.h"
 #include "mesh/mesh_image.h"
 #include "train/loop/view_order.h"
@@ -213,9 +214,34 @@ bool facesItsMiddle(const TriMesh& mesh) {
   return flux < 0;
 }
 
+/// How much of the steps is over, by their number or by the time that there is.
+class StepClock {
+ public:
+  /// In: watch: of the whole work, which must outlive this.
+  StepClock(const Stopwatch& watch, const RefineOptions& options)
+      : watch_(watch), options_(options), begin_(watch.seconds()), last_(begin_) {}
+
+  /// Before step i. 1 or more: there is no time for another one that takes as long as the last.
+  double done(uint32_t i) {
+    const double by_number = static_cast<double>(i) / options_.iterations;
+    if (options_.seconds == 0) return by_number;
+    const double now = watch_.seconds();
+    const double step = now - last_;
+    last_ = now;
+    if (now + step >= options_.seconds) return 1;
+    return std::max(by_number, (now - begin_) / (options_.seconds - begin_));
+  }
+
+ private:
+  const Stopwatch& watch_;
+  const RefineOptions& options_;
+  double begin_, last_;  ///< seconds
+};
+
 SplatCloud refineTo(const DrawTarget& draw, const char* stage, const std::vector<Camera>& views,
                     RenderBackend& backend, const SplatCloud& start, const RefineOptions& options,
                     Progress* progress) {
+  const Stopwatch watch;
   backend.upload(start);
   addTargets(draw, views, stage, backend, progress);
   ImageLossOptions loss;
@@ -224,8 +250,10 @@ SplatCloud refineTo(const DrawTarget& draw, const char* stage, const std::vector
   const double share =
       std::clamp(startingError(views, loss, backend) / kErrorOfFullRates, kLeastShare, 1.0);
   ViewOrder order(views.size(), options.seed);
+  StepClock clock(watch, options);
   for (uint32_t i = 0; i < options.iterations; ++i) {
-    const double done = static_cast<double>(i) / options.iterations;
+    const double done = clock.done(i);
+    if (done >= 1) break;
     advance(progress, 0.2 + 0.8 * done, "Refining splats");
     const size_t view = order.at(i);
     backend.forward(views[view], renderOptions(view));

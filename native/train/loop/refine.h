@@ -17,6 +17,9 @@ struct RefineOptions {
   ViewRig rig = ViewRig::kAutomatic;
   uint64_t seed = 0;
   double ssim_share = 0.0;  ///< 0..1 of the loss beside L1
+  /// The whole work ends by then, with as many steps as fit, whose rates fall as time goes by; 0:
+  /// it takes all steps.
+  double seconds = 0;
 };
 
 /// Fits a reduced cloud to pictures of the full one: every attribute by Adam, the count stays.
@@ -24,7 +27,7 @@ struct RefineOptions {
 /// In: start: the splats to move, as a cut gives them; full: what they stand for.
 /// Returns: as many splats as start, in its order.
 /// Errors: kInvalidArgument for an empty cloud, clouds of different colour space, options out of
-/// range. Same result for any number of threads.
+/// range. Same result for any number of threads, but where seconds decide how many steps there are.
 /// Cost: iterations times (drawing, loss, backward) of one view, and view_count drawings of full.
 /// Source: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 5
 /// (loss and Adam on activated attributes). Differs: no densification; targets are drawings.

@@ -162,6 +162,26 @@ TEST(FitSettings, AFitDoesNotGoOnAsAnotherModelOrWithOtherViews) {
   EXPECT_NE(message(other).find("number of views was 2; now it is 3"), std::string::npos);
 }
 
+TEST(FitSettings, AFitDoesNotGoOnFromAnotherStart) {
+  const MemoryViewSource views = threeViews();
+  const FitOptions options = resolved(defaultFitOptions());
+  SplatCloud start;
+  start.resize(2);
+  const FitSettings own = settingsOf(options, views);
+  const FitSettings given = settingsOf(options, views, &start);
+  EXPECT_EQ(readSettings(settingsJson(given)).start_key, given.start_key);
+  requireSameSettings(settingsJson(given), given, "a");
+  start.positions[5] = 1;
+  const FitSettings other = settingsOf(options, views, &start);
+  const auto message = [&](const FitSettings& before, const FitSettings& now) {
+    return messageOf([&] { requireSameSettings(settingsJson(before), now, "a"); },
+                     ErrorCode::kInvalidArgument);
+  };
+  EXPECT_NE(message(given, other).find("began with other splats"), std::string::npos);
+  EXPECT_NE(message(given, own).find("began with other splats"), std::string::npos);
+  EXPECT_NE(message(own, given).find("began without splats"), std::string::npos);
+}
+
 TEST(FitMemory, LowersSplatsAndImagesToItsLimit) {
   const MemoryViewSource views = threeViews();
   FitOptions options = resolved(defaultFitOptions());

@@ -221,6 +221,32 @@ TEST(EdgeWeights, ThoseOfAllSplatsAndOfWhatPassesThemAreThoseOfThePicture) {
   EXPECT_NEAR(sum, whole, 1e-6 * static_cast<double>(pixelCount(camera)));
 }
 
+TEST(EdgeWeights, AreTheSameAloneAndBesideOthers) {
+  // Faint splats and opaque ones, so that some pixels are in doubt and are judged in double.
+  SplatCloud cloud = smallCloud(400, 1, 233);
+  for (size_t i = 0; i < cloud.size(); i += 3) cloud.opacities[i] = 1;
+  const Camera camera = frontCamera(83, 61, 60, 3);
+  const std::vector<float> gradient = randomWeights(pixelCount(camera) * 4, 18, -1, 1);
+  const std::vector<float> edges = randomWeights(pixelCount(camera), 19, 0, 1);
+  const SplatInstance instance{&cloud};
+  BackwardInput input;
+  input.colour_gradient = gradient;
+  input.edge_weights = edges;
+  const SplatGradients alone = renderBackward({&instance, 1}, camera, {}, input).instances[0];
+  input.with_blending_weights = true;
+  const SplatGradients beside = renderBackward({&instance, 1}, camera, {}, input).instances[0];
+  double most = 0;
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    // Sums of the same terms in float32, of up to the pixels of a tile, in another order.
+    EXPECT_NEAR(alone.edge_weights[i], beside.edge_weights[i],
+                1e-5 * static_cast<double>(beside.edge_weights[i]) + 1e-7);
+    most = std::max(most, static_cast<double>(beside.edge_weights[i]));
+    EXPECT_NEAR(alone.opacities[i], beside.opacities[i],
+                1e-5 * std::abs(static_cast<double>(beside.opacities[i])) + 1e-5);
+  }
+  EXPECT_GT(most, 1);
+}
+
 TEST(ErrorContributions, SumAndLargestAgreeWithThePixelsOneByOne) {
   const SplatCloud cloud = smallCloud(15, 0, 240);
   const Camera camera = frontCamera(11, 9, 8, 3);

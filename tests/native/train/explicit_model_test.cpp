@@ -7,10 +7,12 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <string>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "data/clouds/sh_degree.h"
 #include "densify/strategies.h"
 #include "train/allocation_count.h"
 #include "train/fit_scene.h"
@@ -318,6 +320,34 @@ class NoViews final : public ViewEvaluator {
  private:
   ViewStatistics statistics_;
 };
+
+TEST(ExplicitModel, BeginsWithSplatsThatAreThere) {
+  SplatCloud start = withShDegree(truth(), 1);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> uniform(-0.5f, 0.5f);
+  for (size_t i = 0; i < start.sh.size(); ++i) {
+    if (i % start.shStride() >= 3) start.sh[i] = uniform(random);
+  }
+  const auto views = viewsOf(start, camerasAround(12, 64));
+  ExplicitModelOptions options;
+  options.strategy = "mcmc";  // which makes what it starts itself fainter and smaller
+  options.sh_degree = 2;
+  const auto model = makeExplicitModel(*cpuBackends(), start, options);
+  const SplatCloud begun = model->splats(0);
+  EXPECT_EQ(begun.positions, start.positions);
+  EXPECT_EQ(begun.sh, withShDegree(start, 2).sh);
+  EXPECT_EQ(begun.sh.size(), 60u * 27);
+  for (size_t i = 0; i < 60; ++i) EXPECT_NEAR(begun.opacities[i], start.opacities[i], 1e-6f);
+  // The views show these splats, their harmonics included: nothing is lost at the first step.
+  Fit fit(*views, *model, 1000);
+  EXPECT_LT(fit.run(1).l1, 1e-5);
+
+  options.sh_degree = 0;
+  EXPECT_EQ(makeExplicitModel(*cpuBackends(), start, options)->splats(0).sh, truth().sh);
+  EXPECT_THAT(messageOf([&] { makeExplicitModel(*cpuBackends(), SplatCloud(), options); },
+                        ErrorCode::kInvalidArgument),
+              HasSubstr("no splats to begin with"));
+}
 
 TEST(ExplicitModel, CallsTheHooksOfAStrategyInTheirOrder) {
   std::vector<std::string> log;

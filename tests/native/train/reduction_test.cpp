@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "data/clouds/cloud_extent.h"
 #include "splat/render/projection.h"
 #include "splat/render/render.h"
@@ -338,6 +339,31 @@ TEST(Refine, BringsAWrongCloudNearerToTheFullOne) {
   unseen.size = 96;
   const auto views = viewsOfCloud(*cpuBackends(), full, unseen);
   EXPECT_LT(pictureError(refined, full, views), 0.4 * pictureError(start, full, views));
+}
+
+TEST(Refine, EndsInTheTimeThatItGets) {
+  const SplatCloud full = sphere(400, 1.0, 1);
+  SplatCloud start = full;
+  for (float& x : start.sh) x *= 0.5f;
+  RefineOptions options;
+  options.view_count = 12;
+  options.view_size = 96;
+  options.iterations = 1000000;  // an hour
+  options.seconds = 1;
+  const Stopwatch watch;
+  const SplatCloud refined = refineCloud(*cpuBackends(), start, full, options);
+  // A step takes a few milliseconds; where others use the machine it may take a hundred times that.
+  EXPECT_LT(watch.seconds(), 10);
+  ViewRigOptions unseen;
+  unseen.seed = 99;
+  unseen.size = 96;
+  const auto views = viewsOfCloud(*cpuBackends(), full, unseen);
+  EXPECT_LT(pictureError(refined, full, views), 0.9 * pictureError(start, full, views));
+  // Where no time is left behind the images, the start comes back (by way of logarithms).
+  options.seconds = 1e-9;
+  const SplatCloud left = refineCloud(*cpuBackends(), start, full, options);
+  EXPECT_EQ(left.positions, start.positions);
+  EXPECT_EQ(left.sh, start.sh);
 }
 
 TEST(Refine, IsTheSameForAnyNumberOfThreads) {

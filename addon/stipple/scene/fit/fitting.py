@@ -18,7 +18,7 @@ from ...binding.structs import FitModel, FitQuality, FitShell, JobState
 from .. import meshes
 from . import fit_proposal, fit_reports, series, strategies, view_task, view_times
 from ..sequence import frames
-from ..source import setting_paths, source_paths, sources
+from ..source import decoded, edits, placement, setting_paths, source_paths, sources
 from ..view import photo_cameras
 
 # What a native stage is called.
@@ -106,6 +106,11 @@ class FitTask(view_task.ViewTask):
         super().__init__(context, objects, settings)
         _check_places(self._native, settings)
         self.plan = plan_of(context, settings)
+        self._start = None
+        begins_with = settings.begin_with if settings.model == 'EXPLICIT' else None
+        if begins_with is not None:
+            self._start = _start_of(begins_with, self._frame_of_views(), settings.max_splats)
+            self.colour_space = self._start.info().colour_space
         self._path = path
         self._clip_start, self._clip_begin = None, 0.0
         self._key_frames = ()
@@ -180,7 +185,7 @@ class FitTask(view_task.ViewTask):
             options.max_anchors = min(options.max_anchors, most)
             options.min_anchors = min(options.min_anchors, options.max_anchors)
         yield 'use', 0.0, 'Starting the fit'
-        self.job = Fit.start(self._native, views, options)
+        self.job = Fit.start(self._native, views, options, self._start)
         begun = None
         try:
             while True:
@@ -244,6 +249,20 @@ def _seconds_left(figures, begun):
     """Of the steps: at the pace of the last ones, or of all with their measurements where that is slower."""
     rest = figures.iterations - figures.iteration
     return max(figures.seconds_left, figures.seconds * rest / (figures.iteration - begun))
+
+
+def _start_of(obj, frame, max_splats):
+    """All splats of an object, where views of this frame see them. Errors: StippleError for what has no splats of its
+    own, and for more than the fit may have."""
+    edits.refuse_sequence(obj)
+    edits.refuse_moving(obj)
+    cloud = decoded.full_cloud(obj.data)
+    count = cloud.info().count
+    if count > max_splats:
+        raise invalid(f"'{obj.name}', which the fit begins with, has {count:,} splats, and Splats allows {max_splats:,}; "
+                      'raise it, or begin with fewer.')
+    to_views = np.linalg.inv(frames.to_world(frame)) @ placement.matrix_of(obj)
+    return cloud if np.array_equal(to_views, np.eye(4)) else cloud.transformed(to_views)
 
 
 def plan_of(context, settings):

@@ -115,10 +115,13 @@ def size_label(context, operator):
         return str(error)
     form = formats.of_path(operator.filepath) or formats.of_path('a' + formats.USUAL_EXTENSION)
     total = size = 0
+    written = set()  # datablocks that the file has once
     for obj in objects:
         count = _count(obj.data, operator.budget)
         total += count
-        if form is not None:
+        if form is not None and obj.data not in written:
+            if form.holds_times and operator.keep_objects:
+                written.add(obj.data)
             size += formats.estimated_bytes(form, count, splat_data.degree(obj.data), ascii=operator.ascii,
                                             half=operator.half, sh_degree_limit=operator.max_degree)
     return f'{total:,} splats, about {megabytes(size)}'

@@ -45,13 +45,14 @@ PixelLoss<double> lossAt(const PictureLoss& picture, size_t pixel) {
   if (picture.picture->with_background) loss.gradient[3] = 0.0;
   loss.gradient[3] += input.coverage_gradient;
   if (picture.wants.mode == BackwardMode::kGradients) return loss;
+  loss.edge = valueAt(input.edge_weights, pixel, 0.0);
+  if (picture.wants.mode == BackwardMode::kEdges) return loss;
   const double weight = valueAt(input.residual_weights, pixel, 1.0);
   for (size_t c = 0; c < 3; ++c) {
     const double residual = valueAt(input.residual, pixel * 3 + c, 0.0);
     loss.signed_weight[c] = residual < 0.0 ? -weight : weight;
     loss.room[c] = 2.0 * weight * std::abs(residual);
   }
-  loss.edge = valueAt(input.edge_weights, pixel, 0.0);
   loss.error = valueAt(input.errors, pixel, 0.0);
   return loss;
 }
@@ -219,6 +220,7 @@ void TileBackward::takeStatistics(const Tile& tile) {
     const size_t row = static_cast<size_t>(y) * kTileSide;
     const size_t pixel = pixelOf(*loss_, tile, 0, y);
     copyRow(input.edge_weights, pixel, pixels.edge + row);
+    if (loss_->wants.mode == BackwardMode::kEdges) continue;
     copyRow(input.errors, pixel, pixels.error + row);
     const float* weights = input.residual_weights.empty() ? ones : &input.residual_weights[pixel];
     for (size_t c = 0; c < 3; ++c) {

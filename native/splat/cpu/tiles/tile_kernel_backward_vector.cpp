@@ -86,8 +86,9 @@ HWY_NOINLINE void judgeLanes(Tag d, hn::Mask<Tag> unclear, size_t splat, size_t 
 template <BackwardMode kMode, bool kDepth, TileCulling kCulling = TileCulling::kAll>
 void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& options,
                    BackwardPixels& pixels, float* sums) {
-  constexpr bool kContributions = kMode != BackwardMode::kGradients;
   constexpr bool kStatistics = kMode == BackwardMode::kStatistics;
+  constexpr bool kContributions = kStatistics || kMode == BackwardMode::kContributions;
+  constexpr bool kEdges = kMode == BackwardMode::kEdges;
   constexpr bool kCullsRows = kCulling != TileCulling::kNothing;
   constexpr bool kCullsLanes = kCulling == TileCulling::kAll;
   constexpr size_t kFieldCount = backwardFieldCount({kMode, kDepth});
@@ -198,6 +199,9 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
           contribution = hn::Add(contribution, channel(2, blue));
           sum_contribution = hn::Add(sum_contribution, contribution);
         }
+        if constexpr (kEdges) {
+          sum_edge = hn::MulAdd(weight, hn::Load(d, pixels.edge + i), sum_edge);
+        }
         if constexpr (kStatistics) {
           const Vec scaled = hn::Mul(squared_g_scale, s);
           const Vec along =
@@ -237,6 +241,7 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
     float four[4];
     sumFour(d, sum_blue, sum_contribution, sum_weight, sum_edge, four);
     out[kFieldBlue] = four[0];
+    if constexpr (kEdges) out[kFieldEdgeAlone] = four[3];
     if constexpr (kContributions) out[kFieldContribution] = four[1];
     if constexpr (kStatistics) std::copy(four + 2, four + 4, out + kFieldWeight);
     if constexpr (kStatistics) {
@@ -267,6 +272,8 @@ void takeOffInMode(const TileSplat* splats, size_t count, const TakeOffOptions& 
                                                                  sums);
     case BackwardMode::kStatistics:
       return takeOffSplats<BackwardMode::kStatistics, kDepth>(splats, count, options, pixels, sums);
+    case BackwardMode::kEdges:  // comes without depth
+      return takeOffSplats<BackwardMode::kEdges, false>(splats, count, options, pixels, sums);
   }
 }
 

@@ -81,8 +81,12 @@ void requireRanges(const BackwardInput& input) {
 BackwardWants wantsOf(const BackwardInput& input) {
   const bool with_depth = !input.depth_gradient.empty();
   if (input.with_blending_weights || input.with_absolute_screen_gradients || input.with_covered ||
-      !input.edge_weights.empty() || !input.errors.empty()) {
+      !input.errors.empty()) {
     return {BackwardMode::kStatistics, with_depth};
+  }
+  if (!input.edge_weights.empty()) {
+    const bool is_alone = input.residual.empty() && !with_depth;
+    return {is_alone ? BackwardMode::kEdges : BackwardMode::kStatistics, with_depth};
   }
   return {input.residual.empty() ? BackwardMode::kGradients : BackwardMode::kContributions,
           with_depth};
@@ -177,11 +181,13 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, RenderWorkspace
   return total;
 }
 
-void storeStatistics(const BackwardInput& input, const float* sums, const double* mean,
-                     size_t index, SplatGradients& out) {
+void storeStatistics(const BackwardInput& input, BackwardMode mode, const float* sums,
+                     const double* mean, size_t index, SplatGradients& out) {
   if (!input.residual.empty()) out.contributions[index] = sums[kFieldContribution];
   if (input.with_blending_weights) out.blending_weights[index] = sums[kFieldWeight];
-  if (!input.edge_weights.empty()) out.edge_weights[index] = sums[kFieldEdge];
+  if (!input.edge_weights.empty()) {
+    out.edge_weights[index] = sums[mode == BackwardMode::kEdges ? kFieldEdgeAlone : kFieldEdge];
+  }
   if (input.with_screen_gradients) {
     for (size_t axis = 0; axis < 2; ++axis) {
       out.screen_gradients[index * 2 + axis] = static_cast<float>(mean[axis]);
@@ -218,10 +224,11 @@ void takeBackRows(BackProjector project, const PlacedScene& scene, const PlacedC
   double means[kRowsAtOnce * 2];
   SummedRows summed{rows, places, 0, sums.of(0), sums.stride(), {}};
   if (!input.depth_gradient.empty()) summed.depth_field = sums.fieldCount() - 1;
+  const BackwardMode mode = wantsOf(input).mode;
   const auto flush = [&] {
     project(scene, placed, summed, out, means, camera);
     for (size_t i = 0; i < summed.count; ++i) {
-      storeStatistics(input, summed.sumsOf(i), means + i * 2, rows[i], out);
+      storeStatistics(input, mode, summed.sumsOf(i), means + i * 2, rows[i], out);
     }
     summed.count = 0;
   };
