@@ -17,7 +17,7 @@
 
 // Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023 (sizes
 // from three neighbours, opacity 0.1). Differs: depth, the pictures and the cameras' volume serve
-// where there are no points, and beside them where there are few.
+// where there are no points, and beside them where there are few; splats are smaller.
 
 namespace stipple {
 
@@ -25,6 +25,9 @@ namespace {
 
 constexpr float kStartOpacity = 0.1f;
 constexpr size_t kNeighbours = 3;
+/// A splat's size over the distance to its neighbours. As large as the distance, faint splats lie
+/// over each other so often that a pixel shows hundreds of them, which takes most of a short fit.
+constexpr double kSizeOfDistance = 0.7;
 constexpr double kLeastSquaredSize = 1e-7;  ///< m^2
 /// Of the distance to the nearest camera: the size of a point without any neighbour.
 constexpr double kLonelyShare = 0.01;
@@ -212,11 +215,12 @@ std::vector<float> sizesOf(const StartPoints& points, const std::vector<Camera>&
         for (const Camera& camera : cameras) {
           nearest = std::min(nearest, (placeOf(camera) - place).norm());
         }
-        sum = std::pow(kLonelyShare * nearest, 2);
+        sum = std::pow(kLonelyShare / kSizeOfDistance * nearest, 2);
         count = 1;
       }
       const double squared = std::max(sum / static_cast<double>(count), kLeastSquaredSize);
-      sizes[i] = static_cast<float>(std::min(std::sqrt(squared), 1e18));
+      const double size = kSizeOfDistance * std::sqrt(squared);
+      sizes[i] = static_cast<float>(std::min(size, 1e18));
     }
   });
   return sizes;

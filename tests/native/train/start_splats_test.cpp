@@ -56,7 +56,7 @@ TEST(StartSplats, StandAtThePointsAsLargeAsTheirNeighboursAreFar) {
   EXPECT_EQ(cloud.sh_degree, 3);
   for (size_t i = 0; i < 8; ++i) {
     for (size_t k = 0; k < 3; ++k) {
-      EXPECT_NEAR(cloud.scales[i * 3 + k], 1, 1e-6f);
+      EXPECT_NEAR(cloud.scales[i * 3 + k], 0.7f, 1e-6f);
       EXPECT_EQ(cloud.positions[i * 3 + k], points.positions[i * 3 + k]);
       const float colour = kShC0 * cloud.sh[i * 48 + k] + 0.5f;
       EXPECT_NEAR(colour, linearToSrgb(points.colours[k]), 1e-6f);
@@ -77,7 +77,7 @@ TEST(StartSplats, PointsAtOnePlaceAndAPointAloneHaveASize) {
   StartOptions options;
   options.count = 10;
   // sqrt(1e-7).
-  for (const float scale : startOf(*views, options).scales) EXPECT_NEAR(scale, 3.162e-4f, 1e-6f);
+  for (const float scale : startOf(*views, options).scales) EXPECT_NEAR(scale, 0.7f * 3.162e-4f, 1e-6f);
   points.positions.resize(3);
   points.colours.resize(3);
   points.opacities.resize(1);
