@@ -17,16 +17,18 @@ _FILE = 'detail.safetensors'
 
 
 def _weights_path(chosen):
-    """The file that was chosen, or the one in the folder of the Preferences. Errors: StippleError."""
+    """The file that was chosen, the one in the folder of the Preferences, or the one that came with the add-on. Errors:
+    StippleError."""
     if chosen:
         return bpy.path.abspath(chosen)
-    folder = preferences.chosen_weights_folder()  # no network of this kind comes with the add-on
+    folder = preferences.chosen_weights_folder()
+    for one in filter(None, (folder, preferences.shipped_weights_folder())):
+        path = os.path.join(one, _FILE)
+        if os.path.exists(path):
+            return path
     if not folder:
         raise invalid(f'No folder of weights is chosen: choose the one with {_FILE} in the Preferences of Stipple.')
-    path = os.path.join(folder, _FILE)
-    if not os.path.exists(path):
-        raise invalid(f"{_FILE} is not in '{folder}'; 'stipple train' with \"detail\" writes it.")
-    return path
+    raise invalid(f"{_FILE} is not in '{folder}'; 'stipple train' with \"detail\" writes it.")
 
 
 class STIPPLE_OT_add_detail(ViewsFirst, JobOperator, bpy.types.Operator):
@@ -42,7 +44,7 @@ class STIPPLE_OT_add_detail(ViewsFirst, JobOperator, bpy.types.Operator):
     view_count: IntProperty(name="Views", description="Images that the network looks at, spread evenly; 0 is as "
                             "many as it was trained with", default=0, min=0, max=64)
     weights: StringProperty(name="Weights", description=f"File of the network; empty for {_FILE} in the folder of the "
-                            "Preferences", subtype='FILE_PATH')
+                            "Preferences, or the one that comes with the add-on", subtype='FILE_PATH')
 
     @classmethod
     def poll(cls, context):
