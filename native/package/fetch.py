@@ -5,8 +5,8 @@
     fetch.py FOLDER [--mirror http://deb.debian.org/debian] [--zig]
 
 FOLDER/downloads keeps the files, FOLDER/debs gets the packages and FOLDER/source one folder for each source, with
-Debian's patches; with --zig FOLDER/zig gets the compiler for other systems, by npm. What is there already, and right, is
-left alone.
+Debian's patches; with --zig FOLDER/zig gets the compiler for other systems, by npm. What is there already, and right,
+is left alone.
 """
 
 import argparse

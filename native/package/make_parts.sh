@@ -31,6 +31,9 @@ $python native/package/fetch.py "$folder" --mirror "${mirror:-http://deb.debian.
 if [ ${#cross[@]} -eq 0 ]; then
   $python native/package/glibc_stubs.py "$parts"
 fi
+if [ ${#zig[@]} -gt 0 ]; then
+  bash native/package/zig_compilers.sh "$folder/zig/zig" "native/package/$kind.cmake" "$parts/bin"
+fi
 cmake -S native/package/parts -B "$parts/parts" -G Ninja -DCMAKE_BUILD_TYPE=Release "${cross[@]}" \
   -DSTIPPLE_SOURCES="$folder/source" -DSTIPPLE_PARTS="$parts" >/dev/null
 cmake --build "$parts/parts" --parallel "$jobs"
@@ -54,9 +57,6 @@ maps="-ffile-prefix-map=$folder=parts"
 launcher=()
 if command -v ccache >/dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
-fi
-if [ ${#zig[@]} -gt 0 ]; then
-  launcher=()  # zig keeps what it compiled by itself
 fi
 own_build jpeg -DENABLE_SHARED=OFF -DWITH_TURBOJPEG=OFF -DREQUIRE_SIMD=ON
 own_build imath -DIMATH_INSTALL_PKG_CONFIG=OFF

@@ -3,6 +3,11 @@
 include(${CMAKE_CURRENT_LIST_DIR}/cross_parts.cmake)
 # Warnings of the other compiler are looked at there.
 target_compile_options(stipple_flags INTERFACE -Wno-error)
+# What nearly every file includes is read once for each folder: libc++ takes longer to read than our code to compile.
+find_package(Eigen3 REQUIRED)
+include_directories(SYSTEM ${EIGEN3_INCLUDE_DIRS})
+target_precompile_headers(stipple_flags INTERFACE <algorithm> <array> <cmath> <cstdint> <functional> <limits> <memory>
+  <optional> <span> <string> <vector> <Eigen/Core> <Eigen/Geometry>)
 
 if(NOT APPLE)
   # stipple_package_link(TARGET): links a library or a program for the package.
