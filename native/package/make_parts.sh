@@ -65,9 +65,8 @@ own_build openexr -DOPENEXR_BUILD_TOOLS=OFF -DOPENEXR_INSTALL_EXAMPLES=OFF -DOPE
 
 if [[ $kind == macos_* ]]; then
   # What zig links into every program, for LLVM's linker: zig says where it keeps them.
-  target=$(sed -n 's/^set(STIPPLE_ZIG_TARGET \(.*\))$/\1/p' "native/package/$kind.cmake")
   echo 'int main() { throw 1; }' >"$parts/empty.cpp"
-  linked=$(ZIG_VERBOSE_LINK=1 "$folder/zig/zig" c++ -target "$target" -O2 "$parts/empty.cpp" -o "$parts/empty" 2>&1)
+  linked=$(ZIG_VERBOSE_LINK=1 "$parts/bin/c++" -O2 "$parts/empty.cpp" -o "$parts/empty" 2>&1)
   for name in libc++.a libc++abi.a libcompiler_rt.a; do
     cp "$(tr ' ' '\n' <<<"$linked" | grep "/$name\$" | tail -1)" "$parts/lib/$name"
   done

@@ -1,6 +1,6 @@
 # The part that the toolchains of macOS and of Linux on ARM share: clang and libc++ of zig, which fetch.py brings and
-# which has the C library of every system that it compiles for. The file that
-# includes this sets STIPPLE_ZIG_KIND, _TARGET, _PROCESSOR and _CPU.
+# which has the C library of every system that it compiles for. The file that includes this sets STIPPLE_ZIG_KIND,
+# _TARGET, _PROCESSOR and _CPU.
 set(CMAKE_SYSTEM_PROCESSOR ${STIPPLE_ZIG_PROCESSOR})
 # The compilers that zig_compilers.sh has written.
 set(STIPPLE_ZIG $ENV{STIPPLE_ZIG})

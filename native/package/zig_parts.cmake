@@ -32,5 +32,6 @@ set(CMAKE_CXX_CREATE_SHARED_LIBRARY
 set(CMAKE_CXX_LINK_EXECUTABLE
   "${linker} -rpath @executable_path/../lib -o <TARGET> <OBJECTS> <LINK_LIBRARIES> ${libraries}")
 function(stipple_package_link TARGET)
-  set_target_properties(${TARGET} PROPERTIES BUILD_WITH_INSTALL_RPATH ON)
+  # The folder where the tool looks stands in the lines above.
+  set_target_properties(${TARGET} PROPERTIES SKIP_BUILD_RPATH ON)
 endfunction()

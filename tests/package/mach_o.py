@@ -8,7 +8,7 @@ import struct
 PROCESSORS = {0x0100000c: 'arm64', 0x01000007: 'x64'}
 MAGIC = 0xfeedfacf
 KINDS = {2: 'program', 6: 'library'}
-TWO_LEVELS = 0x80
+TWO_LEVELS, HAS_SHARED_NAMES, LOOKS_FOR_SHARED_NAMES = 0x80, 0x8000, 0x10000
 LOAD_LIBRARY, LIBRARY_NAME, SEGMENT, SIGNATURE, RUN_PATH, BUILD_VERSION = 0xc, 0xd, 0x19, 0x1d, 0x8000001c, 0x32
 # Of a signature, with the most significant byte first.
 SUPER_BLOB, CODE_DIRECTORY, FIRST_SLOT = 0xfade0cc0, 0xfade0c02, 0

@@ -81,8 +81,18 @@ def test_the_system_of_that_age_has_every_name_that_is_asked_for(macos_zip, libr
     asked = symbols(library, ['--undefined-only'])
     assert len(asked) > 100 and 'malloc' in asked and 'stipple_version_string' not in asked
     assert sorted(name for name in asked if f'_{name}' not in known) == []
-    # Each is looked for in the system alone, whatever else Blender has loaded.
-    assert mach_o.File(library.read_bytes()).flags & mach_o.TWO_LEVELS
+
+
+def test_no_name_is_shared_with_what_else_blender_has_loaded(library):
+    """Names are looked for in the system alone, and those that many libraries of C++ have stay each library's own."""
+    flags = mach_o.File(library.read_bytes()).flags
+    assert flags & mach_o.TWO_LEVELS
+    assert not flags & (mach_o.HAS_SHARED_NAMES | mach_o.LOOKS_FOR_SHARED_NAMES)
+
+
+def test_names_would_be_shared_without_a_list(tool):
+    """The tool, which nothing else loads, has no such list: what the test above looks for is there."""
+    assert mach_o.File(tool.read_bytes()).flags & mach_o.HAS_SHARED_NAMES
 
 
 def test_only_the_functions_of_the_header_are_exported(library, root):
