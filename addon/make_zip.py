@@ -21,7 +21,9 @@ PACKAGE = PROJECT / 'addon' / 'stipple'
 PLATFORM = 'linux-x64'
 LIBRARIES = ('libstipple.so', 'libstipple_media.so', 'libstipple_packing.so')
 # Of each platform that a release is made for: the one library, which holds what the others above do.
-SELF_CONTAINED_LIBRARIES = {'linux-x64': ('libstipple.so',), 'windows-x64': ('stipple.dll',)}
+SELF_CONTAINED_LIBRARIES = {'linux-x64': ('libstipple.so',), 'linux-arm64': ('libstipple.so',),
+                            'windows-x64': ('stipple.dll',),
+                            'macos-arm64': ('libstipple.dylib',), 'macos-x64': ('libstipple.dylib',)}
 # Where oneDNN was there when the library was built; without it networks run on Stipple's own kernels.
 OPTIONAL_LIBRARIES = ('libstipple_nn.so',)
 # A fixed time, so that equal content gives an equal zip.

@@ -4,6 +4,8 @@
 #   bash native/install_dependencies.sh            what building, running and testing takes
 #   bash native/install_dependencies.sh --package  also what making the add-on's zip takes (native/package)
 #   bash native/install_dependencies.sh --windows  the same, and what making and testing the zip for Windows takes
+#   bash native/install_dependencies.sh --zig      the same as --package, and what making and testing the zips for macOS
+#                                                  and for Linux on ARM takes; npm fetches the compiler
 set -euo pipefail
 
 packages=(
@@ -32,11 +34,15 @@ packages=(
 package_packages=(g++-12 dpkg-dev patch xz-utils ca-certificates nasm)
 # The compiler for Windows, and what runs its programs here.
 windows_packages=(g++-mingw-w64-x86-64-posix wine wine64)
+# Archives of libraries, the linker of macOS and what looks into its files; what runs programs of ARM, and a C library.
+zig_packages=(llvm llvm-14 lld-16 qemu-user libc6-arm64-cross)
+command -v npm >/dev/null || zig_packages+=(npm)
 case ${1:-} in
   '') ;;
   --package) packages+=("${package_packages[@]}") ;;
   --windows) packages+=("${package_packages[@]}" "${windows_packages[@]}") ;;
-  *) echo "Dependencies: the option is '$1'; it must be --package or --windows." >&2; exit 1 ;;
+  --zig) packages+=("${package_packages[@]}" "${zig_packages[@]}") ;;
+  *) echo "Dependencies: the option is '$1'; it must be --package, --windows or --zig." >&2; exit 1 ;;
 esac
 
 missing=()

@@ -48,8 +48,8 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
                             "shown, as far as the cache has room; 0 to read each when it is shown", default=4, min=0,
                             max=64)
     library_path: StringProperty(name="Library", description="Absolute path of libstipple.so, on Windows of "
-                                 "stipple.dll; empty for the one inside the add-on. Paths that start at the open "
-                                 "file are refused", subtype='FILE_PATH')
+                                 "stipple.dll, on macOS of libstipple.dylib; empty for the one inside the add-on. "
+                                 "Paths that start at the open file are refused", subtype='FILE_PATH')
     points_above: IntProperty(name="Points Above", description="Maximum number of splats that a 3D view draws as "
                                                                "ellipses. Beyond it, the largest objects are drawn as"
                                                                " colored points", default=POINTS_ABOVE, min=0,

@@ -1,11 +1,11 @@
 #include "densify/strategies.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_reading.h"
 
 namespace stipple {
 
@@ -43,7 +43,7 @@ Term parseTerm(const std::string& text) {
     double value = 0;
     if (equals == std::string::npos || equals == 0) failTerm(text);
     const char* last = pair.data() + pair.size();
-    const auto read = std::from_chars(pair.data() + equals + 1, last, value);
+    const auto read = readNumber(pair.data() + equals + 1, last, value);
     if (read.ec != std::errc{} || read.ptr != last || !std::isfinite(value)) failTerm(text);
     term.values[pair.substr(0, equals)] = value;
     begin = end + 1;

@@ -1,11 +1,11 @@
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <optional>
 #include <vector>
 
 #include "base/error.h"
+#include "base/number_reading.h"
 #include "fit/fit_option_table.h"
 
 namespace stipple {
@@ -49,7 +49,7 @@ std::string bytesText(uint64_t bytes) {
 template <typename T>
 std::optional<T> parsed(std::string_view text) {
   T value = {};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const auto [end, error] = readNumber(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
 }

@@ -1,11 +1,11 @@
 #include "mesh/mesh_depth.h"
 
 #include <algorithm>
-#include <atomic>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "base/atomic_ref.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "math/affine.h"
@@ -23,7 +23,7 @@ class DepthBuffer {
 
   void put(uint32_t x, uint32_t y, double z) const {
     const float value = static_cast<float>(std::min(z, static_cast<double>(kEmptyDepth)));
-    std::atomic_ref<float> here(depth_[static_cast<size_t>(y) * width_ + x]);
+    const AtomicRef<float> here(depth_[static_cast<size_t>(y) * width_ + x]);
     float seen = here.load(std::memory_order_relaxed);
     while (value < seen && !here.compare_exchange_weak(seen, value, std::memory_order_relaxed)) {
     }

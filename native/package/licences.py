@@ -42,12 +42,25 @@ FROM_PACKAGES = {
     'nlohmann-json': ('nlohmann-json3-dev', 'JSON for Modern C++'),
     'boost': ('libboost1.74-dev', 'Boost: headers that OpenVDB uses'),
     'stb': ('libstb-dev', 'stb: outlines of letters'),
+}
+FROM_GCC = {
     'gcc': ('libstdc++-12-dev', "GCC's libstdc++ and libgcc, under the GCC Runtime Library Exception"),
 }
 # On Windows also what stands between the compiler and the system.
 FOR_WINDOWS = {
     'mingw-w64': ('mingw-w64-x86-64-dev', 'mingw-w64: the start of programs, functions of C99, threads of POSIX'),
 }
+# What zig adds instead of GCC: the file in its folder, and what it is. The unwinder of macOS is the system's own.
+FROM_ZIG = {
+    'libc++': ('lib/libcxx/LICENSE.TXT', "LLVM's libc++"),
+    'libc++abi': ('lib/libcxxabi/LICENSE.TXT', "LLVM's libc++abi: exceptions"),
+    'zig': ('LICENSE', "zig's compiler-rt: arithmetic that processors lack"),
+}
+FROM_ZIG_ON_LINUX = {
+    'libunwind': ('lib/libunwind/LICENSE.TXT', "LLVM's libunwind: exceptions"),
+    'glibc': ('lib/libc/glibc/LICENSES', 'the few functions of the GNU C library that every program holds'),
+}
+ZIG_PLATFORMS = ('macos-arm64', 'macos-x64', 'linux-arm64')
 COMMON_TEXTS = ('Apache-2.0', 'LGPL-2.1', 'MPL-2.0', 'GPL-3')
 
 
@@ -69,13 +82,19 @@ def gather(parts, output, platform):
     output.mkdir(parents=True)
     index = {}
     is_windows = platform.startswith('windows')
+    is_by_zig = platform in ZIG_PLATFORMS
     for folder, about in COMPILED.values():
         shutil.copyfile(licence_of_source(parts / 'source' / folder), output / f'{folder}.txt')
         index[f'{folder}.txt'] = about
-    for name, (package, about) in (FROM_PACKAGES | (FOR_WINDOWS if is_windows else {})).items():
+    for name, (package, about) in (FROM_PACKAGES | ({} if is_by_zig else FROM_GCC)
+                                  | (FOR_WINDOWS if is_windows else {})).items():
         shutil.copyfile(DOCS / package / 'copyright', output / f'{name}.txt')
         index[f'{name}.txt'] = about
-    if not is_windows:
+    if is_by_zig:
+        for name, (file, about) in (FROM_ZIG | (FROM_ZIG_ON_LINUX if platform.startswith('linux') else {})).items():
+            shutil.copyfile(parts / 'zig' / file, output / f'{name}.txt')
+            index[f'{name}.txt'] = about
+    elif not is_windows:
         shutil.copyfile(parts / 'debs/libc6-dev/usr/share/doc/libc6-dev/copyright', output / 'glibc.txt')
         index['glibc.txt'] = 'the few functions of the GNU C library that every program holds'
     font = (HERE.parent / 'plot/font/sans_regular.cpp').read_text(encoding='utf-8')

@@ -4,23 +4,35 @@
 # glibc 2.28. What is made stays for the next run.
 #   bash native/package/make_parts.sh             for Linux, in build/package
 #   bash native/package/make_parts.sh --windows   for Windows by mingw-w64, in build/package/windows
+#   bash native/package/make_parts.sh --macos-arm64, --macos-x64 or --linux-arm64
+#                                                 by zig, in build/package/macos_arm64 and so on
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 folder=$PWD/build/package
 jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
 python=/usr/bin/python3
 parts=$folder
-cross=()
-if [ "${1:-}" = --windows ]; then
-  parts=$folder/windows
-  cross=(-DCMAKE_TOOLCHAIN_FILE="$PWD/native/package/windows.cmake")
+cross=() zig=() kind=
+case ${1:-} in
+  '') ;;
+  --windows) kind=windows ;;
+  --macos-arm64 | --macos-x64 | --linux-arm64) kind=${1#--} kind=${kind/-/_} zig=(--zig) ;;
+  *) echo "make_parts.sh: the option '$1' is none of --windows, --macos-arm64, --macos-x64 and --linux-arm64." >&2
+     exit 1 ;;
+esac
+if [ -n "$kind" ]; then
+  parts=$folder/$kind
+  cross=(-DCMAKE_TOOLCHAIN_FILE="$PWD/native/package/$kind.cmake")
 fi
 
 # The mirror that this machine's packages come from.
 mirror=$(sed -n 's/^URIs: *//p' /etc/apt/sources.list.d/debian.sources 2>/dev/null | head -1)
-$python native/package/fetch.py "$folder" --mirror "${mirror:-http://deb.debian.org/debian}"
+$python native/package/fetch.py "$folder" --mirror "${mirror:-http://deb.debian.org/debian}" "${zig[@]}"
 if [ ${#cross[@]} -eq 0 ]; then
   $python native/package/glibc_stubs.py "$parts"
+fi
+if [ ${#zig[@]} -gt 0 ]; then
+  bash native/package/zig_compilers.sh "$folder/zig/zig" "native/package/$kind.cmake" "$parts/bin"
 fi
 cmake -S native/package/parts -B "$parts/parts" -G Ninja -DCMAKE_BUILD_TYPE=Release "${cross[@]}" \
   -DSTIPPLE_SOURCES="$folder/source" -DSTIPPLE_PARTS="$parts" >/dev/null
@@ -50,3 +62,13 @@ own_build jpeg -DENABLE_SHARED=OFF -DWITH_TURBOJPEG=OFF -DREQUIRE_SIMD=ON
 own_build imath -DIMATH_INSTALL_PKG_CONFIG=OFF
 own_build openexr -DOPENEXR_BUILD_TOOLS=OFF -DOPENEXR_INSTALL_EXAMPLES=OFF -DOPENEXR_INSTALL_PKG_CONFIG=OFF \
   -DOPENEXR_INSTALL_TOOLS=OFF
+
+if [[ $kind == macos_* ]]; then
+  # What zig links into every program, for LLVM's linker: zig says where it keeps them.
+  echo 'int main() { throw 1; }' >"$parts/empty.cpp"
+  linked=$(ZIG_VERBOSE_LINK=1 "$parts/bin/c++" -O2 "$parts/empty.cpp" -o "$parts/empty" 2>&1)
+  for name in libc++.a libc++abi.a libcompiler_rt.a; do
+    cp "$(tr ' ' '\n' <<<"$linked" | grep "/$name\$" | tail -1)" "$parts/lib/$name"
+  done
+  cp "$folder/zig/lib/libc/darwin/libSystem.11.tbd" "$parts/lib/libSystem.tbd"
+fi

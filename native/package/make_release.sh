@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Makes the zip of the add-on that runs on every machine of a system, build/stipple-VERSION-PLATFORM.zip: linux_x64, for
-# every Linux of x86-64 with glibc 2.28 or newer, or windows_x64.
+# Makes the zip of the add-on that runs on every machine of a kind, build/stipple-VERSION-PLATFORM.zip: linux_x64, for
+# every Linux of x86-64 with glibc 2.28 or newer, windows_x64, macos_arm64, macos_x64 or linux_arm64.
 #   bash native/package/make_release.sh             makes the one for Linux and looks at it
 #   bash native/package/make_release.sh --windows   makes the one for Windows, and runs it by Wine where that is
-#   bash native/package/make_release.sh --twice     after either: makes it again from a copy of the sources in another
+#   bash native/package/make_release.sh --macos-arm64, --macos-x64 or --linux-arm64
+#                                                   makes the one for these and looks at it; qemu runs that of Linux
+#   bash native/package/make_release.sh --twice     after any: makes it again from a copy of the sources in another
 #                                                   folder, without a compiler's cache, and compares the bytes
 # Takes Debian 12. STIPPLE_JOBS: compilers at a time.
 set -euo pipefail
@@ -19,8 +21,14 @@ for option; do
       parts=$folder/windows preset=windows libraries=bin platform=windows-x64 dependencies=--windows
       parts_option=(--windows) targets=(stipple stipple_tool)
       ;;
+    --macos-arm64 | --macos-x64 | --linux-arm64)
+      platform=${option#--} preset=${platform/-/_} parts=$folder/$preset dependencies=--zig
+      parts_option=("$option") targets=(stipple stipple_tool)
+      ;;
     --twice) twice=yes ;;
-    *) echo "make_release.sh: the option is '$option'; --windows and --twice are known." >&2; exit 1 ;;
+    *) echo "make_release.sh: the option is '$option'; --windows, --macos-arm64, --macos-x64, --linux-arm64 and" \
+            "--twice are known." >&2
+       exit 1 ;;
   esac
 done
 
@@ -39,18 +47,20 @@ bash native/package/make_parts.sh "${parts_option[@]}"
 make_zip "$PWD"
 zip=build/$name
 ls -l "build/$preset/$libraries"
-if [ $platform = windows-x64 ]; then
-  STIPPLE_WINDOWS_ZIP=$PWD/$zip $python -m pytest -q -rs -p no:cacheprovider tests/package/test_windows.py
-else
-  STIPPLE_ZIP=$PWD/$zip $python -m pytest -q -rs -p no:cacheprovider tests/package
-fi
+tests=tests/package variable=STIPPLE_ZIP
+case $platform in
+  windows-x64) tests=tests/package/test_windows.py variable=STIPPLE_WINDOWS_ZIP ;;
+  macos-*) tests=tests/package/test_macos.py variable=STIPPLE_MACOS_ZIP ;;
+  linux-arm64) tests=tests/package/test_linux_arm64.py variable=STIPPLE_ARM_ZIP ;;
+esac
+env "$variable=$PWD/$zip" $python -m pytest -q -rs -p no:cacheprovider $tests
 
 if [ -n "$twice" ]; then
   copy=build/second
   rm -rf "$copy"
   mkdir -p "$copy"
   git ls-files -z | xargs -0 cp --parents -t "$copy"
-  CCACHE_DISABLE=1 make_zip "$PWD/$copy"
+  CCACHE_DISABLE=1 STIPPLE_ZIG=$parts/bin make_zip "$PWD/$copy"
   cmp "$zip" "$copy/build/$name"
   echo "Made twice, with the same bytes: $(sha256sum < "$zip" | cut -c 1-64)"
 fi

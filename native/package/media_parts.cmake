@@ -6,7 +6,10 @@ function(stipple_media_parts TARGET)
     ${STIPPLE_PACKAGE_PARTS}/include ${STIPPLE_PACKAGE_PARTS}/include/openvdb ${STIPPLE_PACKAGE_PARTS}/include/Imath
     ${STIPPLE_PACKAGE_PARTS}/include/OpenEXR
     ${sources}/openvdb/openvdb ${sources}/tinygltf ${sources}/png ${sources}/webp/src ${sources}/zlib ${sources}/zstd/lib)
-  if(WIN32)
+  if(STIPPLE_ZIG)
+    # Boost 1.74 has a base class that C++17 took away and libc++ keeps for those who ask.
+    target_compile_definitions(${TARGET} PRIVATE _LIBCPP_ENABLE_CXX17_REMOVED_UNARY_BINARY_FUNCTION)
+  elseif(WIN32)
     # Without them OpenVDB's headers look for it, and for OpenEXR, in a .dll.
     target_compile_definitions(${TARGET} PRIVATE OPENVDB_STATICLIB OPENVDB_OPENEXR_STATICLIB)
   endif()

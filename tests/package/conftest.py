@@ -55,6 +55,18 @@ def windows_zip():
 
 
 @pytest.fixture(scope='session')
+def macos_zip():
+    """The zip that native/package/make_release.sh --macos-arm64 or --macos-x64 has made and hands to these tests."""
+    return _named_zip('STIPPLE_MACOS_ZIP', 'bash native/package/make_release.sh --macos-arm64')
+
+
+@pytest.fixture(scope='session')
+def arm_zip():
+    """The zip that native/package/make_release.sh --linux-arm64 has made and hands to these tests."""
+    return _named_zip('STIPPLE_ARM_ZIP', 'bash native/package/make_release.sh --linux-arm64')
+
+
+@pytest.fixture(scope='session')
 def windows_library(windows_zip, tmp_path_factory):
     """stipple.dll as it lies in the zip."""
     folder = tmp_path_factory.mktemp('dll')

@@ -81,7 +81,7 @@ def test_every_licence_is_in_the_zip(release):
     there = {file.name for file in (release / 'licences').iterdir()} - {'README.txt'}
     assert set(named) == there
     needed = {f'{folder}.txt' for folder, _ in licences.COMPILED.values()}
-    assert needed <= there and {f'{name}.txt' for name in licences.FROM_PACKAGES} <= there
+    assert needed <= there and {f'{name}.txt' for name in licences.FROM_PACKAGES | licences.FROM_GCC} <= there
 
 
 def test_the_release_loads_as_it_came_and_not_when_a_byte_is_changed(release, tmp_path):

@@ -54,7 +54,7 @@ SYSTEM_HEADERS = re.compile(r'(stdint|stddef|errno|locale|fenv|xmmintrin)\.h|[a-
 PLATFORM_HEADERS = {
     r'native/(\w+/platform/posix|mpi|bench|package)/':
         re.compile(r'(strings|stdlib|time|dlfcn|unistd|fcntl|pthread|signal|execinfo)\.h'
-                   r'|sys/(file|random|stat|mman|types|resource|wait|statvfs|ioctl)\.h'),
+                   r'|(sys/(file|random|stat|mman|types|resource|wait|statvfs|ioctl)|mach-o/dyld)\.h'),
     r'native/\w+/platform/windows/':
         re.compile(r'(windows|shellapi|io|fcntl|malloc|signal|dirent|wchar|sys/stat)\.h'),
 }

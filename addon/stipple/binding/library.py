@@ -12,7 +12,7 @@ from .errors import LibraryError
 from .structs import ABI_VERSION
 
 # What the library is called on each system.
-FILE_NAMES = {'win32': 'stipple.dll'}
+FILE_NAMES = {'win32': 'stipple.dll', 'darwin': 'libstipple.dylib'}
 FILE_NAME = FILE_NAMES.get(sys.platform, 'libstipple.so')
 ENVIRONMENT_VARIABLE = 'STIPPLE_LIBRARY'
 

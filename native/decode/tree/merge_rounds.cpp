@@ -1,11 +1,11 @@
 #include "decode/tree/merge_rounds.h"
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <initializer_list>
 #include <limits>
 
+#include "base/atomic_ref.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "decode/tree/merge_neighbours.h"
@@ -302,7 +302,7 @@ class MergeRounds {
       const Entry* list = &entries_[child * kListCapacity];
       for (size_t k = 0; k < sizes_[child]; ++k) {
         // Entries are mutual: these are all who have to look again.
-        std::atomic_ref(touched_[list[k].slot]).store(round_, std::memory_order_relaxed);
+        AtomicRef<uint32_t>(touched_[list[k].slot]).store(round_, std::memory_order_relaxed);
         const uint32_t slot = alias_[list[k].slot];
         if (slot == a) continue;
         bool known = false;

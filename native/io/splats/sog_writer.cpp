@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_reading.h"
 #include "base/parallel.h"
 #include "io/bytes/input_file.h"
 #include "io/bytes/output_file.h"
@@ -55,7 +56,7 @@ double shortest(float value) {
   char digits[32];
   const auto end = std::to_chars(digits, digits + sizeof(digits), value).ptr;
   double parsed = 0;
-  std::from_chars(digits, end, parsed);
+  readNumber(digits, end, parsed);
   return parsed;
 }
 

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_reading.h"
 
 namespace stipple {
 
@@ -135,7 +135,7 @@ class Parser {
     next();
     Number value = 0;
     const char* begin = text_.data() + at_;
-    const auto [end, error] = std::from_chars(begin, text_.data() + text_.size(), value);
+    const auto [end, error] = readNumber(begin, text_.data() + text_.size(), value);
     if (error == std::errc::result_out_of_range) failHere("a number that fits its type");
     if (error != std::errc()) failHere("a number");
     at_ += static_cast<size_t>(end - begin);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/number_reading.h"
 #include "io/bytes/input_file.h"
 
 namespace stipple {
@@ -76,7 +76,7 @@ class ColmapLines {
   T number(const char* what) {
     const std::string_view text = word();
     T value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const auto [end, error] = readNumber(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size()) {
       failHere(std::string("has '") + std::string(text.substr(0, 40)) + "' as " + what +
                "; a number is needed");

@@ -21,7 +21,7 @@ size_t projectRange(Projector project, const PlacedScene& scene, size_t begin, s
   for (size_t cloud = cloudOfSplat(scene, begin); begin < end; ++cloud) {
     const PlacedCloud& placed = scene.clouds[cloud];
     const size_t first = begin - placed.first_index;
-    const size_t last = std::min(end - placed.first_index, placed.cloud->size());
+    const size_t last = std::min<size_t>(end - placed.first_index, placed.cloud->size());
     if (!placed.is_checked && !rowsAreValid(*placed.cloud, first, last)) refuseCloud(placed);
     slot = project(scene, placed, first, last, slots, slot);
     begin = placed.first_index + last;

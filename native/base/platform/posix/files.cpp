@@ -19,7 +19,12 @@ PathStatus statusFrom(const struct stat& from) {
                 : S_ISDIR(from.st_mode) ? PathKind::kFolder
                                         : PathKind::kOther;
   status.bytes = static_cast<uint64_t>(from.st_size);
-  status.modified = static_cast<int64_t>(from.st_mtim.tv_sec) * 1000000000 + from.st_mtim.tv_nsec;
+#ifdef __APPLE__
+  const timespec& modified = from.st_mtimespec;
+#else
+  const timespec& modified = from.st_mtim;
+#endif
+  status.modified = int64_t{modified.tv_sec} * 1000000000 + modified.tv_nsec;
   status.permissions = from.st_mode & 0777;
   return status;
 }
@@ -91,11 +96,24 @@ std::shared_ptr<const uint8_t> mapFile(int descriptor, size_t length) {
           [memory, length](const uint8_t*) { ::munmap(memory, length); }};
 }
 
+namespace {
+
+int syncDescriptor(int descriptor) {
+#ifdef F_FULLFSYNC
+  // On macOS fsync() gives the bytes to the device, which may keep them in its own memory; not
+  // every file system knows the whole way.
+  if (::fcntl(descriptor, F_FULLFSYNC) == 0) return 0;
+#endif
+  return ::fsync(descriptor);
+}
+
+}  // namespace
+
 bool syncFile(const std::string& path) {
   // A new descriptor does: fsync concerns the file and not the handle.
   const int descriptor = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
   if (descriptor < 0) return false;
-  const int sync_error = ::fsync(descriptor) != 0 ? errno : 0;
+  const int sync_error = syncDescriptor(descriptor) != 0 ? errno : 0;
   const int close_error = ::close(descriptor) != 0 ? errno : 0;
   errno = sync_error != 0 ? sync_error : close_error;
   return sync_error == 0 && close_error == 0;

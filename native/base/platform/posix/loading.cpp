@@ -1,12 +1,34 @@
 #include "base/platform/loading.h"
 
 #include <dlfcn.h>
+#ifdef __APPLE__
+#include <mach-o/dyld.h>
+#endif
 
+#include <cstdint>
+#include <string>
 #include <system_error>
 
 namespace stipple::platform {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+fs::path ownProgram(std::error_code& error) {
+#ifdef __APPLE__
+  error.clear();
+  uint32_t length = 0;
+  _NSGetExecutablePath(nullptr, &length);  // which says how long it is
+  std::string name(length, '\0');
+  if (_NSGetExecutablePath(name.data(), &length) != 0) return fs::path();
+  return name.c_str();
+#else
+  return fs::read_symlink("/proc/self/exe", error);
+#endif
+}
+
+}  // namespace
 
 fs::path ownFile() {
   Dl_info info{};
@@ -16,13 +38,17 @@ fs::path ownFile() {
   std::error_code error;
   // A program knows itself by the name that it was called by, which may be relative or in PATH.
   const fs::path file = std::string(info.dli_fname).find('/') == std::string::npos
-                            ? fs::read_symlink("/proc/self/exe", error)
+                            ? ownProgram(error)
                             : fs::absolute(info.dli_fname, error);
   return fs::weakly_canonical(file, error);
 }
 
 std::string libraryFile(const std::string& name) {
+#ifdef __APPLE__
+  return "lib" + name + ".dylib";
+#else
   return "lib" + name + ".so";
+#endif
 }
 
 void* openLibrary(const std::string& path, std::string& why) {

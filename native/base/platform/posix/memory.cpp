@@ -18,12 +18,20 @@ void freeHugePages(void* memory) {
 }
 
 void adviseHugePages(void* memory, size_t bytes) {
+#ifdef MADV_HUGEPAGE
   // Refused where there are no huge pages.
   madvise(memory, bytes, MADV_HUGEPAGE);
+#else
+  static_cast<void>(memory), static_cast<void>(bytes);
+#endif
 }
 
 void populatePages(void* memory, size_t bytes) {
+#ifdef MADV_POPULATE_WRITE
   madvise(memory, bytes, MADV_POPULATE_WRITE);
+#else
+  static_cast<void>(memory), static_cast<void>(bytes);
+#endif
 }
 
 uint64_t machineMemory() {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_reading.h"
 #include "math/half_float.h"
 
 namespace stipple {
@@ -105,7 +105,7 @@ bool isBlank(const char* begin, const char* end) {
 
 bool parseNumber(const char* begin, const char* end, double* value) {
   if (begin != end && *begin == '+') ++begin;
-  const auto [stop, error] = std::from_chars(begin, end, *value);
+  const auto [stop, error] = readNumber(begin, end, *value);
   if (error == std::errc::result_out_of_range && stop == end) {
     // from_chars does not tell overflow from underflow; strtod does.
     *value = std::strtod(std::string(begin, end).c_str(), nullptr);

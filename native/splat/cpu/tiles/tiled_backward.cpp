@@ -268,7 +268,7 @@ void takeBackSplats(BackProjector project, const RenderWorkspace::Arrays& drawn,
     for (size_t cloud = cloudOfSplat(scene, begin); begin < end; ++cloud) {
       const PlacedCloud& placed = scene.clouds[cloud];
       const size_t first = begin - placed.first_index;
-      const size_t last = std::min(end - placed.first_index, placed.cloud->size());
+      const size_t last = std::min<size_t>(end - placed.first_index, placed.cloud->size());
       takeBackRows(project, scene, placed, input, drawn.visible.slots(), arrays.sums, slots, first,
                    last, result.instances[placed.instance], camera);
       begin = placed.first_index + last;
