@@ -75,7 +75,8 @@ def test_undo_brings_the_splats_back(stipple, splats):
     assert data.stipple.source_count == count == stipple.scene.source.splat_data.count(data)
 
 
-def test_messages(stipple, splats, weights_folder, tmp_path):
+def test_messages(stipple, splats, weights_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(stipple.preferences, 'shipped_weights_folder', lambda: '')
     data, count = splats.data, splats.data.stipple.source_count
     run = bpy.ops.stipple.add_detail
     preferences = stipple.preferences.get()

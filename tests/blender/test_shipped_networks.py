@@ -121,3 +121,40 @@ def test_a_render_of_what_they_know_becomes_an_object_of_that_shape(stipple, rea
     # Measured: 3 % of the largest side off at most for the bottle, 12 % for the rock.
     assert np.abs(made - wanted).max() < 0.25 * wanted.max()
     assert (made / made.max()).min() < 0.6
+
+
+def test_detail_shows_more_than_the_splats_that_it_is_made_of(stipple, real, monkeypatch):
+    truth = unseen('bottle', 0)
+    scenes.select(truth)
+    chosen = bpy.context.scene.stipple.fit
+    for name, value in {'view_count': 12, 'view_size': 128, 'engine': 'CYCLES', 'samples': 4, 'max_splats': 4000,
+                        'quality': 'FAST'}.items():
+        setattr(chosen, name, value)
+    # Coarse splats of a thorough fit are cuts of it: that is what the network was taught with.
+    assert bpy.ops.stipple.splats_fit() == {'FINISHED'}
+    made = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
+    made.data.stipple.ratio = 500 / made.data.stipple.source_count
+    assert bpy.ops.stipple.use_as_new_source() == {'FINISHED'}
+    scenes.select(truth, made)
+    bpy.context.view_layer.objects.active = made
+    fit = stipple.binding.fit
+    given = {}
+
+    def noting(context, cloud, views, weights, **options):
+        given.update(context=context, coarse=cloud, views=views, weights=weights)
+        return start(context, cloud, views, weights, **options)
+    densifying = stipple.scene.fit.densifying
+    start = densifying.detail_start
+    monkeypatch.setattr(densifying, 'detail_start', noting)
+    assert bpy.ops.stipple.add_detail() == {'FINISHED'}
+    assert made.data.stipple.source_count == 4 * 500
+    assert Path(given['weights']).parent == real
+
+    def psnr(cloud):
+        """In views that neither the network nor the one step learns from."""
+        options = fit.fit_options(cloud.library, strategy='adaptive', iterations=1, sh_degree=0, holdout=5)
+        job = fit.Fit.start(given['context'], given['views'], options, cloud)
+        job.wait()
+        return job.figures().best_psnr
+    coarse, fine = psnr(given['coarse']), psnr(stipple.scene.source.decoded.full_cloud(made.data))
+    assert fine > coarse + 0.5, (coarse, fine)
