@@ -9,6 +9,7 @@ import subprocess
 import time
 import zlib
 
+import numpy as np
 import pytest
 from fit_dataset import TOOL, dataset, error, figures, help_of, run  # noqa: F401
 
@@ -99,17 +100,24 @@ def test_begins_with_as_many_splats_as_asked(dataset, tmp_path):
     assert json.loads(run('info', tmp_path / 'out.ply', '--json').stdout)['count'] == 70
 
 
+def places(path):
+    """[N,3] of a binary PLY."""
+    ply = path.read_bytes()
+    start = ply.index(b'end_header\n') + len(b'end_header\n')
+    return np.frombuffer(ply[start:], '<f4').reshape(-1, ply[:start].count(b'property float'))[:, :3]
+
+
 def test_begins_with_splats_of_a_file(dataset, tmp_path):
     coarse = tmp_path / 'coarse.ply'
     first = run('fit', dataset, coarse, '--iterations', 300, '--gaussians', 60, '--start', 60, '--holdout', 6)
-    steps = ('--iterations', 1, '--gaussians', 300, '--holdout', 6)
-    before, anew, on = (float(figures(result.stdout)['held_out_psnr']) for result in (
-        first, run('fit', dataset, tmp_path / 'anew.ply', *steps),
-        run('fit', dataset, tmp_path / 'on.ply', *steps, '--start-from', coarse)))
-    assert on > anew + 1 and abs(on - before) < 0.5  # it goes on from where 300 steps were
-    run('fit', dataset, tmp_path / 'same.ply', '--iterations', 1, '--gaussians', 300, '--start-from', coarse)
-    counts = [json.loads(run('info', path, '--json').stdout)['count'] for path in (coarse, tmp_path / 'same.ply')]
-    assert counts[0] - 10 < counts[1] <= counts[0]  # a strategy may remove faint ones at once
+    on = run('fit', dataset, tmp_path / 'on.ply', '--iterations', 1, '--gaussians', 300, '--holdout', 6, '--start-from',
+             coarse)
+    before, after = (float(figures(result.stdout)['held_out_psnr']) for result in (first, on))
+    assert abs(after - before) < 0.5
+    # A step moves them by a thousandth of the scene; a strategy may remove faint ones at once.
+    ours, theirs = places(tmp_path / 'on.ply'), places(coarse)
+    assert len(theirs) - 10 < len(ours) <= len(theirs)
+    assert np.linalg.norm(ours[:, None] - theirs, axis=2).min(1).max() < 0.02
     # Stopped, it goes on from the same splats alone.
     out = tmp_path / 'stopped.ply'
     process = subprocess.Popen([TOOL, 'fit', dataset, out, '--iterations', '200000', '--gaussians', '300',
