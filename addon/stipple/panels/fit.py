@@ -65,6 +65,8 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
         layout.enabled = not fitting.state.is_running
         settings = context.scene.stipple.fit
         layout.prop(settings, 'model')
+        if settings.model == 'EXPLICIT':
+            layout.prop(settings, 'begin_with')
         if settings.model == 'FIELD':
             _draw_switch(layout, settings, 'density_gradient')
             layout.prop(settings, 'shell')
@@ -72,8 +74,6 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
             layout.prop(settings, 'key_frame_spacing')
         elif settings.model != 'SCAFFOLD':
             _draw_strategy(layout, context, settings)
-        if settings.model == 'EXPLICIT':
-            layout.prop(settings, 'begin_with')
         layout.prop(settings, 'seed')
         layout.prop(settings, 'report')
         layout.prop(settings, 'checkpoint')
