@@ -7,6 +7,7 @@
 #include "base/random.h"
 #include "fit/fit_option_table.h"
 #include "io/assets/flat_json.h"
+#include "io/bytes/quoted_text.h"
 
 namespace stipple {
 
@@ -20,15 +21,6 @@ std::string exact(double value) {
   char text[40];
   std::snprintf(text, sizeof(text), "%.17g", value);
   return text;
-}
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return out + "\"";
 }
 
 void mixBytes(uint64_t& key, const void* bytes, size_t count) {
@@ -80,9 +72,9 @@ bool isStored(const FitOption& option, FitKind model) {
 }
 
 std::string jsonOf(const FitOption& option, const FitValue& value) {
-  if (const auto* text = std::get_if<std::string>(&value)) return quoted(*text);
+  if (const auto* text = std::get_if<std::string>(&value)) return quotedText(*text);
   if (const auto* number = std::get_if<double>(&value)) return exact(*number);
-  if (option.is_stored_as_word) return quoted(fitValueText(option, value));
+  if (option.is_stored_as_word) return quotedText(fitValueText(option, value));
   return std::to_string(std::get<uint64_t>(value));
 }
 
@@ -112,8 +104,8 @@ std::string settingsJson(const FitSettings& settings) {
         jsonOf(option, option.member.get(settings.options)));
   }
   add(kViewCount, std::to_string(settings.view_count));
-  add(kViewsKey, quoted(settings.views_key));
-  if (!settings.start_key.empty()) add(kStartKey, quoted(settings.start_key));
+  add(kViewsKey, quotedText(settings.views_key));
+  if (!settings.start_key.empty()) add(kStartKey, quotedText(settings.start_key));
   return text + "}";
 }
 

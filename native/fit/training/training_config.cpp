@@ -14,6 +14,7 @@
 #include "base/nearest_name.h"
 #include "base/number_text.h"
 #include "io/assets/flat_json.h"
+#include "io/bytes/quoted_text.h"
 
 namespace stipple {
 
@@ -39,13 +40,6 @@ struct Setting {
   /// are.
   std::function<std::string()> json;
 };
-
-std::string quoted(const std::string& text) {
-  std::string made(1, '"');
-  made.append(text);
-  made.push_back('"');
-  return made;
-}
 
 double numberOf(const FlatJsonValue& value, const std::string& name) {
   if (const auto* whole = std::get_if<uint64_t>(&value)) return static_cast<double>(*whole);
@@ -106,7 +100,7 @@ Setting choice(const std::string& name, T& place, std::span<const char* const> n
     }
     place = static_cast<T>(found - names.begin());
   };
-  return {name, set, [&place, names] { return quoted(names[static_cast<size_t>(place)]); }};
+  return {name, set, [&place, names] { return quotedText(names[static_cast<size_t>(place)]); }};
 }
 
 /// A setting that came later than others and that weights depend on where `matters` says so: what
@@ -496,7 +490,7 @@ std::string settingsJson(const TrainingConfig& config) {
     const std::string value = setting.json == nullptr ? "" : setting.json();
     if (value.empty()) continue;
     json.push_back(json.empty() ? '{' : ',');
-    json.append(quoted(setting.name)).push_back(':');
+    json.append(quotedText(setting.name)).push_back(':');
     json.append(value);
   }
   return json + "}";

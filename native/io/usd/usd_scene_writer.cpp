@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "data/clouds/sh_degree.h"
+#include "io/bytes/quoted_text.h"
 #include "io/splats/splat_file.h"
 #include "io/usd/usd_file.h"
 #include "io/usd/usd_layer_text.h"
@@ -55,15 +56,6 @@ class PrimNames {
  private:
   std::set<std::string> taken_;
 };
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return out + "\"";
-}
 
 /// The shortest decimals that read back as the same numbers. USD multiplies rows by matrices.
 std::string matrixText(const Mat4d& matrix) {
@@ -160,7 +152,7 @@ class SceneWriter {
     });
     std::string metadata;
     if (name != object.name && !object.name.empty()) {
-      metadata += "    displayName = " + quoted(object.name) + "\n";
+      metadata += "    displayName = " + quotedText(object.name) + "\n";
     }
     if (!found->prim.empty()) {
       metadata += "    instanceable = true\n    prepend references = </" + found->prim + ">\n";
