@@ -110,3 +110,11 @@ def test_a_missing_library_stops_the_zip(tmp_path):
     with pytest.raises(FileNotFoundError, match='libstipple.so'):
         make_zip.make(tmp_path, tmp_path / 'stipple.zip')
     assert not (tmp_path / 'stipple.zip').exists()
+
+
+def test_every_platform_has_the_library_that_the_addon_looks_for():
+    systems = {name: key for key, name in contents.SYSTEMS.items()}
+    for platform, names in make_zip.SELF_CONTAINED_LIBRARIES.items():
+        assert names == (library.FILE_NAMES.get(systems[platform.split('-')[0]], 'libstipple.so'),)
+    listed = re.search(r'^platforms = \[(.*)\]', make_zip.manifest(), re.M).group(1)
+    assert set(re.findall(r'"([^"]+)"', listed)) == set(make_zip.SELF_CONTAINED_LIBRARIES)

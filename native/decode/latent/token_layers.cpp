@@ -117,11 +117,11 @@ CrossAttention::CrossAttention(const WeightTable& weights, const TokenHeads& hea
 
 std::vector<float> CrossAttention::ratesOf(const NetworkRun& run, const Latent& latent) const {
   const size_t stride = to_keys_.outputs();
-  const size_t most = std::min(latent.token_count, kKeyRows);
+  const size_t most = std::min<uint64_t>(latent.token_count, kKeyRows);
   std::vector<float> keys(most * stride);
   std::vector<float> rates(heads_.count * latent.token_count);
   for (size_t first = 0; first < latent.token_count; first += most) {
-    const size_t count = std::min(most, latent.token_count - first);
+    const size_t count = std::min<uint64_t>(most, latent.token_count - first);
     to_keys_.apply(run, count, latent.tokens.data() + first * latent.width, keys.data());
     parallelFor(count, kKeyGrain, [&](size_t begin, size_t end) {
       for (size_t row = begin; row < end; ++row) {

@@ -141,7 +141,8 @@ class TamingScore final : public ControlPart {
       if (!hasLookedAt(view)) others.push_back(view);
     }
     const std::vector<double> alike(others.size(), 1.0);
-    const size_t wanted = options_.view_count - std::min(options_.view_count, looked_at_.size());
+    const size_t wanted =
+        options_.view_count - std::min<uint64_t>(options_.view_count, looked_at_.size());
     StatisticRequest request;
     ask(request);
     for (const uint32_t view :

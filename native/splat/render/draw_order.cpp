@@ -245,7 +245,7 @@ void orderForDrawing(std::span<const SplatInstance> instances, const Camera& cam
         [](size_t value, const OrderedCloud& placed) { return value < placed.first_index; });
     for (auto placed = after - 1; begin < end; ++placed) {
       const size_t first = begin - placed->first_index;
-      const size_t last = std::min(end - placed->first_index, placed->cloud->size());
+      const size_t last = std::min<size_t>(end - placed->first_index, placed->cloud->size());
       if (!placed->is_checked && !rowsAreValid(*placed->cloud, first, last)) {
         const std::string name = "instance " + std::to_string(static_cast<size_t>(placed->number));
         validate(*placed->cloud, name.c_str());
