@@ -81,17 +81,29 @@ def optical_flow(before, after):
 
 
 class Judge:
-    """The held-out views of one data set."""
+    """The held-out views of one data set. With a stretch of frames cameras take turns: of each stretch one judges, and
+    turns change in the middle of two multiples of it, so that steps from one frame to the next count there, too."""
 
-    def __init__(self, context, folder):
+    def __init__(self, context, folder, stretch=0):
         self._context, self._renderer = context, Renderer(context)
         views = Views.open(context, folder)
         self._cameras = {}
+        files = sorted((folder / 'moving').glob('*.npy'))
         names = [views.view_info(i).name.decode() for i in range(len(views))]
-        for path in sorted((folder / 'moving').glob('*.npy')):
+        for turn, path in enumerate(files):
             of_camera = sorted((name, i) for i, name in enumerate(names) if Path(name).parent.name == path.stem)
-            frames = [(int(Path(name).stem), views.camera(i), views.read(i)[0][..., :3]) for name, i in of_camera]
-            self._cameras[path.stem] = frames, np.load(path)
+            if stretch:
+                stretches = [(number, (2 * number + stretch) // (2 * stretch)) for number in range(len(of_camera))]
+            else:
+                stretches = [(number, turn) for number in range(len(of_camera))]
+            masks, judged = np.load(path), {}
+            for number, place in stretches:
+                if place % len(files) == turn:
+                    name, view = of_camera[number]
+                    judged.setdefault(place, []).append(
+                        ((int(Path(name).stem), views.camera(view), views.read(view)[0][..., :3].copy()), masks[number]))
+            for place, found in judged.items():
+                self._cameras[path.stem, place] = list(zip(*found))
 
     def __call__(self, result, frame_rate):
         """Figures of a file, with all of its splats."""

@@ -4,7 +4,7 @@
 brings.
 
     compare_relay.py STIPPLE FOLDER [--scenes walker,crossing] [--seeds 1] [--iterations 6000] [--spacing 0.5]
-        [--anchors 6000] [--start 0] [--arms "relay;linear"] [--table]
+        [--anchors 6000] [--start 0] [--arms "chunks;linear"] [--stretch 48] [--table]
 
 FOLDER holds a folder of make_moving.py for each scene, and relay.jsonl: a line for each fit that is done, from which a
 run goes on. Judged are cameras that no fit learns from. Every arm takes the same steps in all: chunks share them. The
@@ -107,7 +107,8 @@ def table(results, given):
             rows = results.find(scene=scene, arm=arm, iterations=given.iterations, anchors=given.anchors,
                                 start=given.start, spacing=given.spacing)
             if rows:
-                cells = (form.format(statistics.mean(row[key] for row in rows)) for key, (form, _) in FIGURES.items())
+                cells = (form.format(statistics.mean(row[key] for row in rows)) if all(key in row for row in rows)
+                         else '–' for key, (form, _) in FIGURES.items())
                 lines.append(f'| {scene} | {arm} | ' + ' | '.join(cells) + ' |')
     return '\n'.join(lines)
 
@@ -123,6 +124,7 @@ def main():
     parser.add_argument('--anchors', type=int, default=6000)
     parser.add_argument('--start', type=int, default=0, help='anchors that a relay begins with; 0: as many as there may be')
     parser.add_argument('--spacing', type=float, default=0.5)
+    parser.add_argument('--stretch', type=int, default=0, help='frames after which another camera judges; 0: all do')
     parser.add_argument('--table', action='store_true', help='print what is there, and fit nothing')
     given = parser.parse_args()
     results = Results(given.folder / 'relay.jsonl')
@@ -130,7 +132,7 @@ def main():
         context = Context(library.load(given.stipple.resolve().parents[1] / 'lib' / 'libstipple.so'))
         for seed in range(given.seeds):
             for scene in given.scenes:
-                judge = Judge(context, given.folder / scene)
+                judge = Judge(context, given.folder / scene, given.stretch)
                 for arm in given.arms:
                     if results.find(scene=scene, arm=arm, seed=seed, iterations=given.iterations,
                                     anchors=given.anchors, start=given.start, spacing=given.spacing):
