@@ -11,18 +11,26 @@ What is compared: the same code with all three parts off, with one more at a tim
 threshold that makes it grow as many splats as all three do, unless it has as many anyway. The cameras that judge are
 those that the data set holds out: no fit learns from them, and its best state is chosen by others. Masked values are of
 the pixels in which something moves (moving/). Flicker is the mean change from one frame to the next that the truth does
-not have, over the truth's.
+not have, over the truth's. Flow is how far the optical flow from one render to the next is from that of the truth, in
+pixels, on the mean over all pixels and over those in which something moves; it is measured where OpenCV is
+(python3-opencv).
 """
 
 import argparse
 import math
 import os
+import shutil
 import statistics
 import subprocess
 import time
 from pathlib import Path
 
 import numpy as np
+
+try:
+    import cv2
+except ModuleNotFoundError:
+    cv2 = None
 from compare_strategies import Results
 from make_scene import Context, DecodeSettings, Model, Renderer, Views, library
 
@@ -42,35 +50,60 @@ FIGURES = {'psnr': ('{:.2f}', 'PSNR'), 'masked_psnr': ('{:.2f}', 'masked PSNR'),
            'splats': ('{:,.0f}', 'splats'), 'processor_seconds': ('{:,.0f}', 'processor seconds')}
 
 
-def fit(stipple, dataset, result, options, iterations, seed):
-    """Seconds, processor seconds and the peak of memory of one fit."""
-    command = [stipple, 'fit', dataset, result, '--iterations', iterations, '--seed', seed, *options]
+def costs_of(command):
+    """Seconds, processor seconds and the peak of memory of a program."""
     start = time.perf_counter()
     process = subprocess.Popen([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     message = process.stderr.read()
     _, status, usage = os.wait4(process.pid, 0)
     if status != 0:
-        raise RuntimeError(f'{options} on {dataset}: {message.decode()}')
+        raise RuntimeError(f'{" ".join(str(part) for part in command)}: {message.decode()}')
     return {'seconds': time.perf_counter() - start, 'processor_seconds': usage.ru_utime + usage.ru_stime,
             'megabytes': usage.ru_maxrss / 1024}
+
+
+def fit(stipple, dataset, result, options, iterations, seed):
+    """What one fit costs."""
+    for left in result.parent.glob(result.name + '.checkpoint*'):  # of a run that was stopped
+        shutil.rmtree(left) if left.is_dir() else left.unlink()
+    return costs_of([stipple, 'fit', dataset, result, '--iterations', iterations, '--seed', seed, *options])
 
 
 def psnr(error):
     return -10 * math.log10(max(np.mean(np.square(error, dtype=np.float64)), 1e-12))
 
 
-class Judge:
-    """The held-out views of one data set."""
+def optical_flow(before, after):
+    """[H,W,2] pixels, by Farneback's method, between pictures [H,W,3] of display values 0..1."""
+    grey = [cv2.cvtColor(np.rint(picture * 255).astype(np.uint8), cv2.COLOR_RGB2GRAY) for picture in (before, after)]
+    return cv2.calcOpticalFlowFarneback(*grey, None, pyr_scale=0.5, levels=3, winsize=15, iterations=3, poly_n=5,
+                                        poly_sigma=1.2, flags=0)
 
-    def __init__(self, context, folder):
+
+class Judge:
+    """The held-out views of one data set. With a stretch of frames cameras take turns: of each stretch one judges, and
+    turns change in the middle of two multiples of it, so that steps from one frame to the next count there, too."""
+
+    def __init__(self, context, folder, stretch=0):
         self._context, self._renderer = context, Renderer(context)
         views = Views.open(context, folder)
         self._cameras = {}
+        files = sorted((folder / 'moving').glob('*.npy'))
         names = [views.view_info(i).name.decode() for i in range(len(views))]
-        for path in sorted((folder / 'moving').glob('*.npy')):
+        for turn, path in enumerate(files):
             of_camera = sorted((name, i) for i, name in enumerate(names) if Path(name).parent.name == path.stem)
-            frames = [(int(Path(name).stem), views.camera(i), views.read(i)[0][..., :3]) for name, i in of_camera]
-            self._cameras[path.stem] = frames, np.load(path)
+            if stretch:
+                stretches = [(number, (2 * number + stretch) // (2 * stretch)) for number in range(len(of_camera))]
+            else:
+                stretches = [(number, turn) for number in range(len(of_camera))]
+            masks, judged = np.load(path), {}
+            for number, place in stretches:
+                if place % len(files) == turn:
+                    name, view = of_camera[number]
+                    judged.setdefault(place, []).append(
+                        ((int(Path(name).stem), views.camera(view), views.read(view)[0][..., :3].copy()), masks[number]))
+            for place, found in judged.items():
+                self._cameras[path.stem, place] = list(zip(*found))
 
     def __call__(self, result, frame_rate):
         """Figures of a file, with all of its splats."""
@@ -80,17 +113,19 @@ class Judge:
 
     def of(self, splats_at, frame_rate):
         """Figures of what a function of seconds gives."""
-        most = 0
+        most, taken, drawn_count = 0, 0, 0
         options = self._renderer.options(output_colour=OutputColour.COMPOSITED, background=(0, 0, 0))
         values = {key: [] for key in ('psnr', 'ssim', 'masked_psnr', 'masked_ssim')}
-        changes, truths = [], []
+        changes, truths, flows = [], [], {'flow': [], 'masked_flow': []}
         for frames, masks in self._cameras.values():
             before = None
             for (frame, camera, truth), mask in zip(frames, masks):
+                start = time.perf_counter()
                 cloud = splats_at(frame / frame_rate)
                 most = max(most, cloud.info().count)
                 task = self._renderer.start([(cloud, np.eye(4))], camera, options, with_depth=False)
                 task.job.wait()
+                taken, drawn_count = taken + time.perf_counter() - start, drawn_count + 1
                 drawn = np.clip(task.colour[..., :3], 0, 1)
                 values['psnr'].append(psnr(drawn - truth))
                 values['ssim'].append(image_loss(self._context, drawn, truth, with_gradient=False)[2])
@@ -101,10 +136,16 @@ class Judge:
                 if before is not None:
                     changes.append(np.abs((drawn - before[0]) - (truth - before[1])).mean())
                     truths.append(np.abs(truth - before[1]).mean())
+                    if cv2:
+                        far = np.linalg.norm(optical_flow(before[0], drawn) - optical_flow(before[1], truth), axis=-1)
+                        flows['flow'].append(far.mean())
+                        if mask.sum() >= LEAST_MOVING:
+                            flows['masked_flow'].append(far[mask].mean())
                 before = drawn, truth
         return {**{key: statistics.mean(found) for key, found in values.items()},
+                **{key: float(statistics.mean(found)) for key, found in flows.items() if found},
                 'flicker': float(statistics.mean(changes) / statistics.mean(truths)),
-                'splats': most}
+                'splats': most, 'frame_seconds': taken / drawn_count}
 
 
 def measure(stipple, judge, given, scene, arm, strategy, seed):

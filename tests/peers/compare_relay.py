@@ -4,11 +4,11 @@
 brings.
 
     compare_relay.py STIPPLE FOLDER [--scenes walker,crossing] [--seeds 1] [--iterations 6000] [--spacing 0.5]
-        [--anchors 6000] [--arms "relay;linear"] [--table]
+        [--anchors 6000] [--start 0] [--arms "chunks;linear"] [--stretch 48] [--table]
 
 FOLDER holds a folder of make_moving.py for each scene, and relay.jsonl: a line for each fit that is done, from which a
 run goes on. Judged are cameras that no fit learns from. Every arm takes the same steps in all: chunks share them. The
-models that move may have as many splats as anchors become at most.
+models that move may have as many splats as anchors become at most. A part is a chunk, a key frame, or the one model.
 """
 
 import argparse
@@ -28,8 +28,10 @@ ARMS = {'one model': None, 'chunks': None,
         'linear': ['--key-frame-blend', 'linear', '--no-growth-by-level'],
         'learned': ['--no-growth-by-level'], 'levels': []}
 FIGURES = {'psnr': ('{:.2f}', 'PSNR'), 'ssim': ('{:.4f}', 'SSIM'), 'masked_psnr': ('{:.2f}', 'masked PSNR'),
-           'flicker': ('{:.3f}', 'flicker'), 'splats': ('{:,.0f}', 'splats at once'),
-           'bytes': ('{:,.0f}', 'bytes'), 'megabytes': ('{:,.0f}', 'peak of training, MiB'),
+           'flicker': ('{:.3f}', 'flicker'), 'flow': ('{:.3f}', 'flow'),
+           'masked_flow': ('{:.3f}', 'masked flow'), 'splats': ('{:,.0f}', 'splats at once'),
+           'bytes_of_part': ('{:,.0f}', 'bytes of a part'), 'frame_seconds': ('{:.3f}', 'seconds of a frame'),
+           'megabytes': ('{:,.0f}', 'peak of training, MiB'),
            'processor_seconds': ('{:,.0f}', 'processor seconds')}
 
 
@@ -60,6 +62,11 @@ def frames_of(folder):
     return len(list((folder / 'cam00').glob('*.png')))
 
 
+def parts_of(folder, spacing):
+    """How many chunks, or key frames, a clip has."""
+    return max(1, math.ceil((frames_of(folder) - 1) / round(spacing * FRAME_RATE)))
+
+
 def measure(context, judge, given, scene, arm, seed):
     dataset, result = given.folder / scene, given.folder / f'{scene}.relay.stipple.safetensors'
     shared = {'dataset': dataset, 'iterations': given.iterations, 'seed': seed}
@@ -69,7 +76,7 @@ def measure(context, judge, given, scene, arm, seed):
         clip, size = Whole(context, result), result.stat().st_size
     elif arm == 'chunks':
         every = round(given.spacing * FRAME_RATE)
-        starts = list(range(0, max(1, frames_of(dataset) - 1), every))
+        starts = [number * every for number in range(parts_of(dataset, given.spacing))]
         paths, all_costs = [], []
         for number, start in enumerate(starts):
             last = frames_of(dataset) - 1 if number + 1 == len(starts) else start + every
@@ -83,11 +90,13 @@ def measure(context, judge, given, scene, arm, seed):
         size = sum(path.stat().st_size for path in paths)
     else:
         costs = fit(given.stipple, result=result, options=[
-            '--model', 'relay', '--max-anchors', given.anchors, '--key-frame-spacing', given.spacing, *ARMS[arm]],
+            '--model', 'relay', '--max-anchors', given.anchors, '--start-splats', given.start, '--key-frame-spacing',
+            given.spacing, *ARMS[arm]],
             **shared)
         clip, size = Whole(context, result), result.stat().st_size
+    parts = 1 if arm == 'one model' else parts_of(dataset, given.spacing)
     return {'scene': scene, 'arm': arm, 'seed': seed, 'iterations': given.iterations, 'anchors': given.anchors,
-            'spacing': given.spacing, **judge.of(clip.at, FRAME_RATE), **costs, 'bytes': size,
+            'start': given.start, 'spacing': given.spacing, **judge.of(clip.at, FRAME_RATE), **costs, 'bytes': size, 'bytes_of_part': size / parts,
             'load': os.getloadavg()[0]}
 
 
@@ -96,9 +105,10 @@ def table(results, given):
     for scene in given.scenes:
         for arm in ARMS:
             rows = results.find(scene=scene, arm=arm, iterations=given.iterations, anchors=given.anchors,
-                                spacing=given.spacing)
+                                start=given.start, spacing=given.spacing)
             if rows:
-                cells = (form.format(statistics.mean(row[key] for row in rows)) for key, (form, _) in FIGURES.items())
+                cells = (form.format(statistics.mean(row[key] for row in rows)) if all(key in row for row in rows)
+                         else '–' for key, (form, _) in FIGURES.items())
                 lines.append(f'| {scene} | {arm} | ' + ' | '.join(cells) + ' |')
     return '\n'.join(lines)
 
@@ -112,7 +122,9 @@ def main():
     parser.add_argument('--seeds', type=int, default=1)
     parser.add_argument('--iterations', type=int, default=6000)
     parser.add_argument('--anchors', type=int, default=6000)
+    parser.add_argument('--start', type=int, default=0, help='anchors that a relay begins with; 0: as many as there may be')
     parser.add_argument('--spacing', type=float, default=0.5)
+    parser.add_argument('--stretch', type=int, default=0, help='frames after which another camera judges; 0: all do')
     parser.add_argument('--table', action='store_true', help='print what is there, and fit nothing')
     given = parser.parse_args()
     results = Results(given.folder / 'relay.jsonl')
@@ -120,10 +132,10 @@ def main():
         context = Context(library.load(given.stipple.resolve().parents[1] / 'lib' / 'libstipple.so'))
         for seed in range(given.seeds):
             for scene in given.scenes:
-                judge = Judge(context, given.folder / scene)
+                judge = Judge(context, given.folder / scene, given.stretch)
                 for arm in given.arms:
                     if results.find(scene=scene, arm=arm, seed=seed, iterations=given.iterations,
-                                    anchors=given.anchors, spacing=given.spacing):
+                                    anchors=given.anchors, start=given.start, spacing=given.spacing):
                         continue
                     row = measure(context, judge, given, scene, arm, seed)
                     results.add(row)

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Films a scene in which something moves with Cycles, by cameras that stand still.
+"""Films a scene in which something moves, by cameras that stand still.
 
     blender -b --factory-startup -P make_moving.py -- FOLDER --scene walker [--cameras 16] [--step 1] [--width 320]
         [--height 180]
+    xvfb-run -a blender --factory-startup -P make_moving.py -- FOLDER --scene passing --flat
+
+Cycles draws the pictures, or with --flat, for long clips, a shader that knows no light (flat_pictures.py).
 
 transforms.json with times (24 frames are a second), cam00/0000.png..., points.ply with times: places that rays through
 random pixels meet at every fourth frame and the last one, as reconstructions of those frames would have them. Two
@@ -14,7 +17,10 @@ Images that are there are kept, so that a run goes on where it ended.
 import argparse
 import json
 import math
+import os
 import sys
+import traceback
+from dataclasses import astuple
 from pathlib import Path
 
 import bpy
@@ -24,7 +30,7 @@ from mathutils import Vector
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from make_photos import POINT_NOISE, settings  # noqa: E402
 from make_scene import write_points  # noqa: E402
-from moving_scenes import FRAMES, SCENES  # noqa: E402
+from moving_scenes import SCENES  # noqa: E402
 
 FRAME_RATE = 24
 FRAMES_BETWEEN_POINTS = 4
@@ -32,14 +38,6 @@ POINTS_PER_MOMENT = 2000
 ANGLE = math.radians(55)
 HELD_OUT = 5, 10
 LEAST_CHANGE = 3  # of 255, in one channel
-
-
-def stands(count):
-    """(place, target) of the cameras: an arc of 140 degrees at two heights."""
-    for camera in range(count):
-        turn = math.radians(-90 - 70 + 140 * camera / (count - 1))
-        height = 1.1 if camera % 2 else 2.1
-        yield Vector((4.2 * math.cos(turn), 4.2 * math.sin(turn), height)), Vector((0, 0, 0.7))
 
 
 def pixels_of(path):
@@ -52,8 +50,8 @@ def pixels_of(path):
     return pixels.reshape(height, width, 4)[::-1]
 
 
-def render(path):
-    path.parent.mkdir(exist_ok=True)
+def render(path, camera):
+    bpy.context.scene.camera = camera
     bpy.context.scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
 
@@ -85,11 +83,22 @@ def main():
     parser.add_argument('--step', type=int, default=1)
     parser.add_argument('--width', type=int, default=320)
     parser.add_argument('--height', type=int, default=180)
+    parser.add_argument('--flat', action='store_true')
     given = parser.parse_args(sys.argv[sys.argv.index('--') + 1:])
     given.folder.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    movers, pose = SCENES[given.scene]()
+    if given.flat:  # a new file would close the window
+        bpy.data.batch_remove(list(bpy.data.objects))
+    else:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    build, length, stands = astuple(SCENES[given.scene])
+    movers, pose = build()
     scene = settings(given, False)
+    draw = render
+    if given.flat:
+        from flat_pictures import FlatPictures, paint
+        solid = [obj for obj in scene.objects if obj.type == 'MESH']
+        paint(solid)
+        draw = FlatPictures(solid, movers, given.width, given.height).write
     focal = given.width / 2 / math.tan(ANGLE / 2)
     cameras = []
     for number, (place, target) in enumerate(stands(given.cameras)):
@@ -103,19 +112,19 @@ def main():
 
     dice = np.random.default_rng(3)
     frames, times, places, shown = [], [], [], []
-    for frame in range(0, FRAMES, given.step):
+    for frame in range(0, length, given.step):
         pose(frame)
         bpy.context.view_layer.update()
         shots = []
         for camera in cameras:
-            scene.camera = camera
             path = given.folder / camera.name / f'{frame:04}.png'
             if not path.exists():
-                render(path)
+                path.parent.mkdir(exist_ok=True)
+                draw(path, camera)
             shots.append((path, camera.matrix_world.copy()))
             frames.append({'file_path': f'{camera.name}/{frame:04}.png', 'time': frame / FRAME_RATE,
                            'transform_matrix': [list(row) for row in camera.matrix_world]})
-        if frame % FRAMES_BETWEEN_POINTS == 0 or frame + given.step >= FRAMES:
+        if frame % FRAMES_BETWEEN_POINTS == 0 or frame + given.step >= length:
             seen = [shot for number, shot in enumerate(shots) if number not in HELD_OUT]
             found = points_of(seen, focal, dice)
             places += found[0]
@@ -126,12 +135,12 @@ def main():
     held_out = [camera.name for number, camera in enumerate(cameras) if number in HELD_OUT]
     for mover in movers:
         mover.hide_render = True
+    (given.folder / 'moving').mkdir(exist_ok=True)
     for name in held_out:
-        scene.camera = bpy.data.objects[name]
-        render(given.folder / 'moving' / (name + '.png'))
+        draw(given.folder / 'moving' / (name + '.png'), bpy.data.objects[name])
         still = pixels_of(given.folder / 'moving' / (name + '.png'))
         masks = []
-        for frame in range(0, FRAMES, given.step):
+        for frame in range(0, length, given.step):
             change = np.abs(pixels_of(given.folder / name / f'{frame:04}.png') - still)[..., :3].max(-1)
             masks.append(change * 255 >= LEAST_CHANGE)
         np.save(given.folder / 'moving' / (name + '.npy'), np.array(masks))
@@ -145,5 +154,20 @@ def main():
     print(f'{len(frames)} images of {given.width} x {given.height}, {len(places)} points in {given.folder}')
 
 
-if __name__ == '__main__':
+def main_in_window():
+    """Ends Blender, too, which would stay."""
+    failed = 1
+    try:
+        main()
+        failed = 0
+    except Exception:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        os._exit(failed)
+
+
+if __name__ == '__main__' and bpy.app.background:
     main()
+elif __name__ == '__main__':
+    bpy.app.timers.register(main_in_window, first_interval=0.5)
