@@ -250,6 +250,7 @@ Dataset::Dataset(const std::string& path, const DatasetOptions& options, Progres
   const ImageHeader first = readImageHeader(views_.front().image_path);
   colour_space_ = first.transfer == Transfer::kSrgb ? ColourSpace::kDisplay : ColourSpace::kLinear;
   points_ = readPoints(path);
+  choosePoints(series_, points_);
 }
 
 ViewPicture Dataset::load(size_t view) const {

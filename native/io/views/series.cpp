@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <set>
 #include <utility>
@@ -204,11 +205,26 @@ void keep(const std::vector<size_t>& chosen, std::vector<DatasetView>& views) {
   views = std::move(kept);
 }
 
+bool takesAllFrames(const SeriesOptions& options) {
+  return options.first_frame == 0 && options.frame_step == 1 &&
+         options.last_frame == SeriesOptions().last_frame;
+}
+
+/// The least difference of two times; 0 where all views have one.
+double secondsBetween(const std::vector<DatasetView>& views) {
+  std::set<double> times;
+  for (const DatasetView& view : views) times.insert(view.view.time);
+  double least = 0;
+  for (auto at = times.begin(); at != times.end() && std::next(at) != times.end(); ++at) {
+    const double step = *std::next(at) - *at;
+    least = least == 0 ? step : std::min(least, step);
+  }
+  return least;
+}
+
 void chooseFrames(const std::string& dataset, const SeriesOptions& options,
                   std::vector<DatasetView>& views) {
-  const bool is_all = options.first_frame == 0 && options.frame_step == 1 &&
-                      options.last_frame == SeriesOptions().last_frame;
-  if (is_all) return;
+  if (takesAllFrames(options)) return;
   const std::vector<uint64_t> numbers = frameNumbers(views);
   const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
   const uint64_t first = std::max(options.first_frame, *least);
@@ -286,6 +302,7 @@ SeriesSize arrangeSeries(const std::string& dataset, const SeriesOptions& option
   timeFrames(dataset, options.frame_rate, files.views);
   nameCameras(files.views);
   noteMissingFrames(dataset, files);
+  if (!takesAllFrames(options)) size.frame_seconds = secondsBetween(files.views);
   chooseFrames(dataset, options, files.views);
   chooseImages(options.max_images, files.views);
   holdOut(dataset, options.held_out_cameras, files.views);
@@ -300,6 +317,39 @@ SeriesSize arrangeSeries(const std::string& dataset, const SeriesOptions& option
   size.time_begin = times.empty() ? 0 : *times.begin();
   size.time_end = times.empty() ? 0 : *times.rbegin();
   return size;
+}
+
+void choosePoints(const SeriesSize& size, PointSet& points) {
+  if (size.frame_seconds == 0 || points.times.empty()) return;
+  const double begin = size.time_begin - size.frame_seconds / 2;
+  const double end = size.time_end + size.frame_seconds / 2;
+  const auto distance = [&](double time) {
+    return std::max({0.0, begin - time, time - end});  // 0 for NaN, too
+  };
+  double nearest = HUGE_VAL;
+  for (const double time : points.times) {
+    if (!std::isnan(time)) nearest = std::min(nearest, distance(time));
+  }
+  std::vector<size_t> kept;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const double time = points.times[i];
+    if (std::isnan(time) || distance(time) <= nearest) kept.push_back(i);
+  }
+  const size_t count = points.size();
+  const auto choose = [&](auto& values) {
+    const size_t row = values.size() / count;
+    for (size_t i = 0; i < kept.size() && row > 0; ++i) {
+      std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(kept[i] * row), row,
+                  values.begin() + static_cast<std::ptrdiff_t>(i * row));
+    }
+    values.resize(kept.size() * row);
+  };
+  for (std::vector<float>* values : {&points.positions, &points.normals, &points.colours,
+                                     &points.areas, &points.weights, &points.harmonics}) {
+    choose(*values);
+  }
+  choose(points.times);
+  choose(points.opacities);  // last, as it tells how many there are
 }
 
 }  // namespace stipple

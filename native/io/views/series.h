@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 
+#include "data/meshes/point_set.h"
 #include "io/views/dataset_files.h"
 
 namespace stipple {
@@ -38,6 +39,9 @@ struct SeriesSize {
   uint64_t camera_count = 0;  ///< of those that are used: cameras with a name
   double time_begin = 0;      ///< seconds, of those that are used
   double time_end = 0;
+  /// Of frames that were chosen: seconds between two of them before any was left out; 0: all are
+  /// used.
+  double frame_seconds = 0;
 };
 
 /// Gives views their times, names their cameras, and leaves out what is not asked for.
@@ -52,5 +56,10 @@ struct SeriesSize {
 /// names of no camera; kFormat where an image's name has no number and other views have frames.
 SeriesSize arrangeSeries(const std::string& dataset, const SeriesOptions& options,
                          DatasetFiles& files);
+
+/// Where frames were chosen, leaves out points that were seen at other times than theirs, half a
+/// frame before and behind counted in; where that leaves none, those of the nearest time stay.
+/// Points of unknown times always do.
+void choosePoints(const SeriesSize& size, PointSet& points);
 
 }  // namespace stipple

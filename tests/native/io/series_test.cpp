@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -427,6 +428,36 @@ TEST(SeriesChoice, FramesThatHaveFewImagesGiveTheirShare) {
     if (f == 4) continue;
     EXPECT_NEAR(static_cast<double>(by_frame[f]), 8.0 * 36 / 73, 1) << f;
   }
+}
+
+TEST(SeriesPoints, AreThoseOfTheFramesThatAreUsed) {
+  PointSet points;
+  for (int i = 0; i < 6; ++i) {
+    const auto value = static_cast<float>(i);
+    points.positions.insert(points.positions.end(), {value, 0, 0});
+    points.colours.insert(points.colours.end(), {value, 1, 1});
+    points.opacities.push_back(1);
+    points.times.push_back(i == 0 ? std::nan("") : 0.5 * i);
+  }
+  const auto chosen = [&](double begin, double end, double frame_seconds) {
+    PointSet copy = points;
+    choosePoints({.time_begin = begin, .time_end = end, .frame_seconds = frame_seconds}, copy);
+    EXPECT_EQ(copy.positions.size(), 3 * copy.size());
+    EXPECT_EQ(copy.colours.size(), 3 * copy.size());
+    EXPECT_EQ(copy.times.size(), copy.size());
+    EXPECT_TRUE(copy.normals.empty());
+    std::vector<float> which;
+    for (size_t i = 0; i < copy.size(); ++i) {
+      which.push_back(copy.positions[i * 3]);
+      EXPECT_EQ(copy.colours[i * 3], copy.positions[i * 3]);
+    }
+    return which;
+  };
+  using Which = std::vector<float>;
+  EXPECT_EQ(chosen(1, 2, 0), (Which{0, 1, 2, 3, 4, 5}));  // all frames are used
+  EXPECT_EQ(chosen(1, 2, 0.1), (Which{0, 2, 3, 4}));
+  EXPECT_EQ(chosen(1.04, 2, 0.1), (Which{0, 2, 3, 4}));  // half a frame before
+  EXPECT_EQ(chosen(1.6, 1.7, 0.1), (Which{0, 3}));  // none is inside: those of the nearest time
 }
 
 }  // namespace
