@@ -80,7 +80,8 @@ def test_the_system_of_that_age_has_every_name_that_is_asked_for(macos_zip, libr
     known = mach_o.system_symbols(stub.read_text(), TARGETS[processor_of(macos_zip)])
     asked = symbols(library, ['--undefined-only'])
     assert len(asked) > 100 and 'malloc' in asked and 'stipple_version_string' not in asked
-    assert sorted(name for name in asked if f'_{name}' not in known) == []
+    # C names have an underscore before them; that by which the loader finds others has none.
+    assert sorted(name for name in asked if f'_{name}' not in known and name not in known) == []
 
 
 def test_no_name_is_shared_with_what_else_blender_has_loaded(library):
