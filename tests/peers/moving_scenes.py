@@ -153,6 +153,21 @@ def walker():
     return list(parts.values()), pose
 
 
+def _things(dice, kinds, count, ranges, last_begin, stays):
+    """[(object, frame at which it appears, frame at which it is gone)] of things in turn of each kind, anywhere in the
+    ranges of x, y and z. stays: least number of frames, and one more than the most."""
+    things = []
+    for number in range(count):
+        at = tuple(dice.uniform(*one) for one in ranges)
+        thing = _moves_alone(lambda: kinds[number % len(kinds)](at))
+        dark = [dice.uniform(0, 0.4) for _ in range(3)]
+        give('ShaderNodeTexVoronoi' if number % 2 else 'ShaderNodeTexNoise', 7, dark,
+             [min(1, value + dice.uniform(0.3, 0.6)) for value in dark])
+        begin = dice.randrange(0, last_begin)
+        things.append((thing, begin, begin + dice.randrange(*stays)))
+    return things
+
+
 def appearing():
     """Things appear and vanish; each stays where it is for 6 to 24 frames."""
     stage()
@@ -162,15 +177,7 @@ def appearing():
              lambda at: mesh.primitive_uv_sphere_add(radius=0.26, location=at),
              lambda at: mesh.primitive_torus_add(major_radius=0.24, minor_radius=0.09, location=at, rotation=(1, 0, 1)),
              lambda at: mesh.primitive_cone_add(radius1=0.26, depth=0.5, location=at))
-    things = []
-    for number in range(14):
-        at = dice.uniform(-1.6, 1.6), dice.uniform(-1.3, 0.5), dice.uniform(0.3, 1.4)
-        thing = _moves_alone(lambda: kinds[number % 4](at))
-        dark = [dice.uniform(0, 0.4) for _ in range(3)]
-        give('ShaderNodeTexVoronoi' if number % 2 else 'ShaderNodeTexNoise', 7, dark,
-             [min(1, value + dice.uniform(0.3, 0.6)) for value in dark])
-        first = dice.randrange(0, FRAMES - 6)
-        things.append((thing, first, first + dice.randrange(6, 25)))
+    things = _things(dice, kinds, 14, ((-1.6, 1.6), (-1.3, 0.5), (0.3, 1.4)), FRAMES - 6, (6, 25))
 
     def pose(frame):
         for thing, first, end in things:
@@ -237,15 +244,7 @@ def doors():
     kinds = (lambda at: mesh.primitive_cube_add(size=0.4, location=at, rotation=(0.4, 0.3, dice.uniform(0, 3))),
              lambda at: mesh.primitive_uv_sphere_add(radius=0.26, location=at),
              lambda at: mesh.primitive_cone_add(radius1=0.26, depth=0.5, location=at))
-    things = []
-    for number in range(24):
-        at = dice.uniform(-1.5, 1.5), dice.uniform(-1.0, 0.5), dice.uniform(0.3, 1.4)
-        thing = _moves_alone(lambda: kinds[number % 3](at))
-        dark = [dice.uniform(0, 0.4) for _ in range(3)]
-        give('ShaderNodeTexVoronoi' if number % 2 else 'ShaderNodeTexNoise', 7, dark,
-             [min(1, value + dice.uniform(0.3, 0.6)) for value in dark])
-        start = dice.randrange(0, LONG - 24)
-        things.append((thing, start, start + dice.randrange(24, 121)))
+    things = _things(dice, kinds, 24, ((-1.5, 1.5), (-1.0, 0.5), (0.3, 1.4)), LONG - 24, (24, 121))
 
     def pose(frame):
         for door, first, period in hinges:  # a second to open, two open, a second to close
