@@ -234,6 +234,15 @@ def test_usd_keeps_objects_and_has_shared_splats_once(stipple, tmp_path):
     world = np.array(bpy.context.object.matrix_world)
     np.testing.assert_allclose(there.positions @ world[:3, :3].T + world[:3, 3], joined.positions, atol=1e-5)
 
+    # An object without splats is left out.
+    bare = scenes.link(bpy.data.objects.new('bare', stipple.scene.source.splat_data.new_data('bare')))
+    empty = stipple.binding.cloud.SplatArrays(*(np.empty((0, width), np.float32) for width in (3, 4, 3)),
+                                              np.empty(0, np.float32), np.empty((0, 1, 3), np.float32))
+    stipple.scene.source.sync.write(bare.data, empty, '')
+    scenes.select(*twins, bare)
+    assert bpy.ops.stipple.splats_export(filepath=str(kept), up_axis='Z') == {'FINISHED'}
+    assert 'bare' not in kept.read_text() and load(stipple, kept).count == 12000
+
     class Settings:
         collection, use_selection, budget, max_degree, filepath = '', True, 'VIEWPORT', 3, str(kept)
         ascii = half = False

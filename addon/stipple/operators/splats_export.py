@@ -143,7 +143,9 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             if keeps_objects:
                 task.advance(0.0, 'Writing splats')
                 placed, frame = clouds
-                save_scene([(name, *one) for name, one in zip(names, placed)], path, frame, **options)
+                # What shows nothing now is no prim, as it adds nothing to joined splats.
+                shown = [(name, *one) for name, one in zip(names, placed) if one[0].info().count > 0]
+                save_scene(shown, path, frame, **options)
                 return sum(cloud.info().count for cloud, _matrix in placed)
             task.advance(0.0, 'Joining splats')
             cloud = exporting.joined(clouds)
