@@ -5,7 +5,8 @@
     run.py [--blender blender] [--library libstipple.so] [pytest arguments...]
 
 Blender sees a fresh user folder with the add-on of this working tree, so nothing of the user's own
-set-up is read or changed. Every test starts from an empty file (conftest.py). The exit code is pytest's.
+set-up is read or changed. Every test starts from an empty file (conftest.py). What the tests and Blender
+write is gone when they end. The exit code is pytest's.
 """
 
 import argparse
@@ -50,10 +51,13 @@ def main():
     with tempfile.TemporaryDirectory(prefix='stipple-blender-') as folder:
         addons = Path(folder, 'user', 'scripts', 'addons')
         addons.mkdir(parents=True)
+        # Blender ends by os._exit, so neither it nor pytest would ever remove its temporary files.
+        temporary = Path(folder, 'temporary')
+        temporary.mkdir()
         (addons / 'stipple').symlink_to(options.addon.resolve(), target_is_directory=True)
         # Debian's Blender asks the first python3 in PATH where its modules are: let that be the system's.
         environment = dict(os.environ, PATH=f"/usr/bin:{os.environ['PATH']}", PYTHONDONTWRITEBYTECODE='1',
-                           BLENDER_USER_RESOURCES=str(Path(folder, 'user')),
+                           BLENDER_USER_RESOURCES=str(Path(folder, 'user')), TMPDIR=str(temporary),
                            STIPPLE_LIBRARY=str(Path(options.library).resolve()))
         inside = INSIDE.format(paths=[str(HERE), '/usr/lib/python3/dist-packages'],
                                arguments=['-p', 'no:cacheprovider', f'--rootdir={HERE}'] + arguments)
