@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "base/stopwatch.h"
+#include "train/anchors/passing_places.h"
 #include "train/anchors/relay_parts.h"
 #include "train/anchors/relay_segments.h"
 #include "train/anchors/relay_work.h"
@@ -27,13 +28,14 @@ namespace {
 
 /// Weights of growth by level at the begin of a segment; they rise to 1 at its end.
 constexpr std::array<double, 3> kLevelWeights = {1, 0.5, 0.25};
-/// Of the second half of a window, the share of steps that draw fewer anchors. It has a few hundred
-/// steps, all of which motion asks for, and what smaller budgets ask for was learned by the global
-/// anchors (docs/methods/relay.md).
+/// Of the second half of the global stage and of windows, the share of steps that draw fewer
+/// anchors. All of them are needed for what is to be learned (docs/methods/relay.md).
 constexpr double kBudgetShare = 0.1;
 /// Of a window, the share of the rates of anchors: they are what the key frame has made them, and
 /// begin without moments.
-constexpr double kWindowRates = 0.3;
+constexpr double kWindowRates = 0.1;
+/// Of all anchors that a key frame may have, those that begin at what passes.
+constexpr double kPassingShare = 0.5;
 /// Budgets that are measured, by octaves.
 constexpr int kMeasuredOctaves = 2;
 /// Key frames that are kept at hand for drawing.
@@ -42,11 +44,12 @@ constexpr size_t kShownKeyFrames = 2;
 class RelayModel final : public FitModel {
  public:
   RelayModel(const BackendFactory& backends, ScaffoldState start, double voxel,
-             std::vector<double> times, const RelayModelOptions& options,
+             std::vector<double> times, PassingPlaces passing, const RelayModelOptions& options,
              std::shared_ptr<KeyFrameStore> store)
       : options_(options),
         voxel_(voxel),
         times_(std::move(times)),
+        passing_(std::move(passing)),
         parts_(std::make_shared<RelayParts>(std::move(store),
                                             relaySegments(options.iterations, options.clip),
                                             shapeOf(*start.scaffold))),
@@ -198,7 +201,7 @@ class RelayModel final : public FitModel {
       case RelayStage::kGlobal:
         break;
       case RelayStage::kKeyFrame:
-        begin(parts_->keyFrame(RelayStage::kGlobal, 0));
+        begin(withPassing(parts_->keyFrame(RelayStage::kGlobal, 0), segment.key));
         break;
       case RelayStage::kWindow: {
         KeyFrame frame = parts_->keyFrame(RelayStage::kKeyFrame, segment.key);
@@ -219,6 +222,22 @@ class RelayModel final : public FitModel {
     if (options_.grows_by_level) {
       work_.state.levels = levelsOfFeatures(work_.state.scaffold->features);
     }
+  }
+
+  /// With anchors at what passes at the time of the key frame. Where there is no room, those that
+  /// are faintest go.
+  KeyFrame withPassing(KeyFrame frame, uint32_t key) const {
+    const double about = kFramesAboutKey / options_.clip.frames_per_second;
+    const double at = options_.clip.timeOf(key);
+    const std::vector<float> places = passing_.between(at - about, at + about);
+    if (places.empty()) return frame;
+    const uint64_t most = options_.anchors.most_anchors;
+    const uint64_t room = std::min<uint64_t>(
+        places.size() / 3, static_cast<uint64_t>(kPassingShare * static_cast<double>(most)));
+    const uint64_t all = frame.scaffold.size() + room;
+    if (all > most) keepAnchors(frame.scaffold, allButFaintest(frame.scaffold, all - most));
+    addStartingAnchors(places, voxel_, room, frame.scaffold);
+    return frame;
   }
 
   void loadPair(uint32_t key) {
@@ -268,8 +287,7 @@ class RelayModel final : public FitModel {
         beginBudgets(state);
         gradients_ = {};
       }
-      count = budgetOfStep(moment, mixBits(options_.anchors.seed ^ *entered_), count,
-                           is_window ? kBudgetShare : 0.5);
+      count = budgetOfStep(moment, mixBits(options_.anchors.seed ^ *entered_), count, kBudgetShare);
     }
     {
       const TimedBlock watch(report.seconds.field);
@@ -381,6 +399,7 @@ class RelayModel final : public FitModel {
   RelayModelOptions options_;
   double voxel_;               ///< metres
   std::vector<double> times_;  ///< of the training views, seconds
+  PassingPlaces passing_;
   std::shared_ptr<RelayParts> parts_;
   RelayWork work_;
   std::vector<uint64_t> anchor_counts_;  ///< of each key frame as it is now
@@ -417,8 +436,10 @@ std::unique_ptr<FitModel> makeRelayModel(const BackendFactory& backends, const V
   const ScaffoldStart start = startOfScaffold(views, training, options.anchors, progress);
   std::vector<double> times;
   for (const size_t view : training) times.push_back(views.time(view));
+  PassingPlaces passing = passingPlaces(views, training, options.anchors.seed, progress);
   return std::make_unique<RelayModel>(backends, startState(start.scaffold), start.voxel,
-                                      std::move(times), options, std::move(store));
+                                      std::move(times), std::move(passing), options,
+                                      std::move(store));
 }
 
 KeyFrameSource relayResult(const FitModel& model) {

@@ -12,10 +12,10 @@ namespace stipple {
 namespace {
 
 constexpr double kGlobalShare = 0.3;
-constexpr double kKeyFrameShare = 0.1;
+constexpr double kKeyFrameShare = 0.25;
 constexpr double kBlendShare = 0.1;
-/// Frames on either side of a key frame whose views it is made of.
-constexpr double kAboutKey = 1.5;
+/// Of a window, how often a view at the key frame is drawn for one at the next key frame.
+constexpr double kMostDraws = 4;
 
 constexpr double kLowQuantile = 0.5;
 constexpr double kHighQuantile = 0.8;
@@ -60,7 +60,7 @@ std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameCl
                                    std::span<const double> times) {
   const double frame = 1 / clip.frames_per_second;
   const double middle = clip.timeOf(segment.key);
-  double before = kAboutKey * frame, behind = before;
+  double before = kFramesAboutKey * frame, behind = before;
   if (segment.stage == RelayStage::kGlobal) before = behind = INFINITY;
   if (segment.stage == RelayStage::kWindow) before = behind = (clip.spacing + 0.5) * frame;
   if (segment.stage == RelayStage::kBlend) {
@@ -71,7 +71,12 @@ std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameCl
   double nearest = INFINITY;
   for (size_t v = 0; v < times.size(); ++v) {
     const double apart = times[v] - middle;
-    if (apart >= -before && apart <= behind) views.push_back(v);
+    if (apart >= -before && apart <= behind) {
+      const double tau = std::abs(apart) / (clip.spacing * frame);
+      const bool is_window = segment.stage == RelayStage::kWindow;
+      const double draws = is_window ? std::ceil(kMostDraws * (1 - tau)) : 1;
+      views.insert(views.end(), static_cast<size_t>(std::max(1.0, draws)), v);
+    }
     nearest = std::min(nearest, std::abs(apart));
   }
   for (size_t v = 0; views.empty() && v < times.size(); ++v) {

@@ -18,6 +18,9 @@ enum class RelayStage : uint32_t {
   kBlend = 4,     ///< how it and the next share the time between them
 };
 
+/// Frames on either side of a key frame whose views it is made of.
+constexpr double kFramesAboutKey = 1.5;
+
 /// A run of steps of one stage with one key frame (or a pair that begins with it).
 struct RelaySegment {
   RelayStage stage = RelayStage::kGlobal;
@@ -29,12 +32,13 @@ struct RelaySegment {
   FitMoment local(const FitMoment& moment) const;
 };
 
-/// Three tenths of the steps are global, one is of key frames, half of windows, one of blending;
-/// where nothing blends, windows have that too. Each segment has at least one step, in order.
+/// Of the steps 0.3 are global, 0.25 of key frames, 0.35 of windows, 0.1 of blending; where nothing
+/// blends, windows have that too. Each segment has at least one step, in order.
 std::vector<RelaySegment> relaySegments(uint64_t iterations, const KeyFrameClip& clip);
 
 /// The views that a segment learns from, as places in `times`: those in its span of time; where
-/// there is none, the nearest. In: times of the views, seconds, at least one.
+/// there is none, the nearest. Windows have those near the key frame more than once, as it counts
+/// for less the nearer the next one is. In: times of the views, seconds, at least one.
 std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameClip& clip,
                                    std::span<const double> times);
 

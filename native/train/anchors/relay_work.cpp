@@ -12,9 +12,10 @@ namespace stipple {
 
 namespace {
 
-/// A window has a few hundred steps, where the publication has tens of thousands.
-constexpr LearningRate kHeadRate = {4e-3, 4e-4};
-constexpr LearningRate kPlaneRate = {3e-2, 3e-3};
+/// A window has a few hundred steps, where the publication has tens of thousands. Higher rates move
+/// what stands still in a room by more than a pixel in each step (docs/methods/relay.md).
+constexpr LearningRate kHeadRate = {1e-3, 1e-4};
+constexpr LearningRate kPlaneRate = {1e-2, 1e-3};
 constexpr LearningRate kBlendRate = {2e-2, 2e-3};
 constexpr uint64_t kMostAnchors = uint64_t{1} << 28;
 
