@@ -40,6 +40,11 @@ make_zip() { # FOLDER of the sources
     --self-contained --platform $platform --output "$1/build/$name"
 }
 
+if [ $dependencies = --zig ]; then
+  # What a compiler's cache has to know of it: its kind, which the script does not tell, and that what is precompiled is
+  # content like any other.
+  export CCACHE_COMPILERTYPE=clang CCACHE_COMPILERCHECK=content CCACHE_SLOPPINESS=pch_defines,time_macros
+fi
 bash native/install_dependencies.sh $dependencies
 jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
 name=$($python -c "import sys; sys.path.insert(0, 'addon'); import make_zip; print(make_zip.split_name('$platform'))")
@@ -47,13 +52,13 @@ bash native/package/make_parts.sh "${parts_option[@]}"
 make_zip "$PWD"
 zip=build/$name
 ls -l "build/$preset/$libraries"
-tests=tests/package variable=STIPPLE_ZIP
+tests=(tests/package) variable=STIPPLE_ZIP
 case $platform in
-  windows-x64) tests=tests/package/test_windows.py variable=STIPPLE_WINDOWS_ZIP ;;
-  macos-*) tests=tests/package/test_macos.py variable=STIPPLE_MACOS_ZIP ;;
-  linux-arm64) tests=tests/package/test_linux_arm64.py variable=STIPPLE_ARM_ZIP ;;
+  windows-x64) tests=(tests/package/test_windows{,_tool}.py) variable=STIPPLE_WINDOWS_ZIP ;;
+  macos-*) tests=(tests/package/test_macos.py) variable=STIPPLE_MACOS_ZIP ;;
+  linux-arm64) tests=(tests/package/test_linux_arm64.py) variable=STIPPLE_ARM_ZIP ;;
 esac
-env "$variable=$PWD/$zip" $python -m pytest -q -rs -p no:cacheprovider $tests
+env "$variable=$PWD/$zip" $python -m pytest -q -rs -p no:cacheprovider "${tests[@]}"
 
 if [ -n "$twice" ]; then
   copy=build/second

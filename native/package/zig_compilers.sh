@@ -34,10 +34,13 @@ write() { # NAME EXTENSION: how zig calls its clang for a file of this kind, wit
   [ ${#kept[@]} -gt 10 ] || { echo "zig_compilers.sh: zig does not say how it compiles: '$words'" >&2; exit 1; }
   {
     echo '#!/bin/sh'
+    # A compiler's cache looks at this file to tell one compiler from another.
+    echo "# zig $("$zig" version)"
     echo 'case " $* " in'
     printf '  *" -c "* | *" -E "*) exec %q clang' "$zig"
     printf ' %q' "${kept[@]}"
-    printf ' "$@" ;;\n'
+    # A precompiled header out of a compiler's cache is as good as the one that was made with these files.
+    printf ' -Xclang -fno-pch-timestamp "$@" ;;\n'
     echo 'esac'
     printf 'exec %q %s' "$zig" "$1"
     printf ' %q' "${target[@]}"
