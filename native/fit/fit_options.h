@@ -57,6 +57,10 @@ struct FitOptions {
   double key_frame_spacing = 1;  ///< seconds
   KeyFrameBlend key_frame_blend = KeyFrameBlend::kLearned;
   bool growth_by_level = RelayModelOptions().grows_by_level;
+  double middle_level_rank = RelayModelOptions().level_quantiles[0];
+  double high_level_rank = RelayModelOptions().level_quantiles[1];
+  double middle_level_weight = RelayModelOptions().level_weights[0];
+  double high_level_weight = RelayModelOptions().level_weights[1];
   uint32_t holdout = 8;
   uint64_t seed = 0;
   double ssim_share = TrainerOptions().ssim_share;

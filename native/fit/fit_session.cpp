@@ -94,6 +94,8 @@ std::unique_ptr<FitModel> relayModel(const BackendFactory& backends, const ViewS
   relay.anchors = scaffoldOptions(options);
   relay.clip = keyFrameClip(options, views);
   relay.grows_by_level = options.growth_by_level;
+  relay.level_quantiles = {options.middle_level_rank, options.high_level_rank};
+  relay.level_weights = {options.middle_level_weight, options.high_level_weight};
   relay.iterations = options.iterations;
   std::shared_ptr<KeyFrameStore> store = std::make_shared<MemoryKeyFrames>();
   if (!options.checkpoint_path.empty()) {

@@ -67,7 +67,8 @@ def test_every_option_of_the_library_is_a_flag_with_a_help():
                  'min-anchors,--least-anchors', 'max-anchors,--most-anchors,--anchors',
                  'gaussians-per-anchor', 'sh-degree', 'antialias', 'density-gradient,--no-density-gradient',
                  'jitter,--no-jitter', 'shell', 'key-frame-spacing', 'key-frame-blend',
-                 'growth-by-level,--no-growth-by-level', 'iterations', 'background', 'holdout', 'seed', 'ssim-share',
+                 'growth-by-level,--no-growth-by-level', 'middle-level-rank', 'high-level-rank',
+                 'middle-level-weight', 'high-level-weight', 'iterations', 'background', 'holdout', 'seed', 'ssim-share',
                  'measure-interval', 'image-bytes,--picture-bytes', 'max-bytes',
                  'checkpoint-interval,--checkpoint-every', 'checkpoint-seconds', 'resume'):
         assert f'  --{name}' in lines, name

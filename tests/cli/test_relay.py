@@ -77,7 +77,7 @@ def test_key_frames_that_are_gone_are_named(moving, tmp_path):  # noqa: F811
     assert 'is not there' in error('fit', moving, out, *FEW, '--resume')
 
 
-@pytest.mark.parametrize('blend', ('linear', 'none'))
+@pytest.mark.parametrize('blend', ('linear', 'none', 'plateau'))
 def test_other_ways_to_share_a_time(moving, blend, tmp_path):  # noqa: F811
     out = tmp_path / 'm.stipple.safetensors'
     run('fit', moving, out, *FEW, '--key-frame-blend', blend, '--no-growth-by-level')
@@ -88,6 +88,14 @@ def test_a_clip_shorter_than_one_spacing_has_one_key_frame(moving, tmp_path):  #
     out = tmp_path / 'm.stipple.safetensors'
     run('fit', moving, out, *FEW[:-1], 5)
     assert b'"key.0.' in out.read_bytes() and b'"key.1.' not in out.read_bytes()
+
+
+def test_levels_of_growth_are_in_order(moving, tmp_path):  # noqa: F811
+    out = tmp_path / 'm.stipple.safetensors'
+    run('fit', moving, out, *FEW, '--middle-level-rank', 0.2, '--high-level-rank', 0.9, '--high-level-weight', 0)
+    message = error('fit', moving, tmp_path / 'x.stipple.safetensors', *FEW, '--middle-level-rank', 0.9)
+    assert 'ranks of 0.9 and 0.8' in message and 'the lower one first' in message
+    assert not (tmp_path / 'x.stipple.safetensors').exists()
 
 
 def test_it_refuses_views_of_one_time_and_what_does_not_concern_it(dataset, moving, tmp_path):  # noqa: F811

@@ -28,6 +28,7 @@ class KeyFrameBlend(IntEnum):
     LEARNED = 0
     LINEAR = 1
     NONE = 2
+    PLATEAU = 3
 
 
 class FitShell(IntEnum):

@@ -450,7 +450,8 @@ class StippleFitOptions(_Sized):
                 ('image_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
                 ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64),
                 ('shell', c_uint32), ('coarse_to_fine', c_uint32), ('key_frame_spacing', c_double),
-                ('key_frame_blend', c_uint32), ('growth_by_level', c_uint32)]
+                ('key_frame_blend', c_uint32), ('growth_by_level', c_uint32), ('middle_level_rank', c_double),
+                ('high_level_rank', c_double), ('middle_level_weight', c_double), ('high_level_weight', c_double)]
 
 
 class StippleRigSearchOptions(_Sized):

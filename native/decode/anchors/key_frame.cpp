@@ -26,6 +26,23 @@ double softplus(double x) {
   return x > 30 ? x : std::log1p(std::exp(x));
 }
 
+/// How far a time is from where an anchor is whole, and its derivative by the offset.
+struct Apart {
+  double distance;
+  double by_offset;
+};
+
+Apart apartOf(double tau, double offset, KeyFrameBlend blend) {
+  if (blend == KeyFrameBlend::kPlateau) {
+    const double apart = std::abs(tau) - std::abs(offset);
+    // An offset of 0 learns, too: it grows in the direction of the time.
+    const bool is_forward = offset == 0 ? tau >= 0 : offset > 0;
+    return apart > 0 ? Apart{apart, is_forward ? -1.0 : 1.0} : Apart{0, 0};
+  }
+  const double apart = tau - offset;
+  return {std::abs(apart), apart > 0 ? -1.0 : apart < 0 ? 1.0 : 0.0};
+}
+
 }  // namespace
 
 uint32_t KeyFrameClip::keyCount() const {
@@ -35,7 +52,7 @@ uint32_t KeyFrameClip::keyCount() const {
 void validate(const KeyFrameClip& clip) {
   if (std::isfinite(clip.begin) && std::isfinite(clip.frames_per_second) &&
       clip.frames_per_second > 0 && clip.frame_count >= 1 && clip.frame_count <= kMostFrames &&
-      clip.spacing >= 1 && std::isfinite(clip.end()) && clip.blend <= KeyFrameBlend::kNone) {
+      clip.spacing >= 1 && std::isfinite(clip.end()) && clip.blend <= KeyFrameBlend::kPlateau) {
     return;
   }
   fail(ErrorCode::kInvalidArgument,
@@ -71,12 +88,12 @@ uint64_t KeyFrame::bytes() const {
          blend.size() * sizeof(float);
 }
 
-std::vector<float> fadingOf(const KeyFrame& frame, size_t count, double tau) {
+std::vector<float> fadingOf(const KeyFrame& frame, size_t count, double tau, KeyFrameBlend blend) {
   std::vector<float> fading(count);
   const size_t at = tau < 0 ? 2 : 0;
   for (size_t a = 0; a < count; ++a) {
     const float* numbers = &frame.blend[a * kBlendNumbers + at];
-    const double apart = std::abs(tau - static_cast<double>(numbers[0]));
+    const double apart = apartOf(tau, static_cast<double>(numbers[0]), blend).distance;
     fading[a] =
         static_cast<float>(std::exp(-kFading * softplus(static_cast<double>(numbers[1])) * apart));
   }
@@ -116,18 +133,16 @@ void sharesBackward(const std::vector<float>& own, const std::vector<float>& oth
 }
 
 void fadingBackward(const KeyFrame& frame, double tau, const std::vector<float>& by_fading,
-                    std::vector<float>& by_blend) {
-  const std::vector<float> fading = fadingOf(frame, by_fading.size(), tau);
+                    std::vector<float>& by_blend, KeyFrameBlend blend) {
+  const std::vector<float> fading = fadingOf(frame, by_fading.size(), tau, blend);
   const size_t at = tau < 0 ? 2 : 0;
   for (size_t a = 0; a < by_fading.size(); ++a) {
     const float* numbers = &frame.blend[a * kBlendNumbers + at];
     const double raw = static_cast<double>(numbers[1]);
-    const double apart = tau - static_cast<double>(numbers[0]);
+    const Apart apart = apartOf(tau, static_cast<double>(numbers[0]), blend);
     const double by = static_cast<double>(by_fading[a]) * static_cast<double>(fading[a]) * kFading;
-    const double sign = apart > 0 ? 1 : apart < 0 ? -1 : 0;
-    by_blend[a * kBlendNumbers + at] += static_cast<float>(by * softplus(raw) * sign);
-    by_blend[a * kBlendNumbers + at + 1] -=
-        static_cast<float>(by * std::abs(apart) * logistic(raw));
+    by_blend[a * kBlendNumbers + at] -= static_cast<float>(by * softplus(raw) * apart.by_offset);
+    by_blend[a * kBlendNumbers + at + 1] -= static_cast<float>(by * apart.distance * logistic(raw));
   }
 }
 
@@ -188,8 +203,10 @@ SplatCloud splatsOfClip(const KeyFrameClip& clip, const KeyFrameSource& frames, 
       shares[i].assign(shown[i].count, static_cast<float>(1 - std::abs(shown[i].tau)));
     }
   } else if (shown.size() == 2) {
-    const std::vector<float> before = fadingOf(*shown[0].frame, shown[0].count, shown[0].tau);
-    const std::vector<float> behind = fadingOf(*shown[1].frame, shown[1].count, shown[1].tau);
+    const auto fadingOfShown = [&](const Shown& one) {
+      return fadingOf(*one.frame, one.count, one.tau, clip.blend);
+    };
+    const std::vector<float> before = fadingOfShown(shown[0]), behind = fadingOfShown(shown[1]);
     shares[0] = sharesOf(before, behind);
     shares[1] = sharesOf(behind, before);
   }

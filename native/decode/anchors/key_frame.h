@@ -20,7 +20,12 @@ enum class KeyFrameBlend : uint32_t {
   kLearned = 0,  ///< by numbers of each anchor
   kLinear = 1,   ///< by how far the time is
   kNone = 2,     ///< the nearer one is shown alone
+  kPlateau = 3,  ///< by numbers of each anchor, which is whole until its offset
 };
+/// Whether anchors have numbers that are learned for it.
+constexpr bool isLearned(KeyFrameBlend blend) {
+  return blend == KeyFrameBlend::kLearned || blend == KeyFrameBlend::kPlateau;
+}
 
 /// The clip that key frames stand in: one at its first frame, then one every `spacing` frames.
 struct KeyFrameClip {
@@ -69,9 +74,11 @@ struct KeyFrame {
 };
 
 /// exp(-lambda d |tau - o|) of each of the first `count` anchors, with o and d of the direction
-/// that tau points in. In: tau -1..1. Source: Kwak et al., MoRel, CVPR 2026 (arXiv 2512.09270),
-/// temporal opacity.
-std::vector<float> fadingOf(const KeyFrame& frame, size_t count, double tau);
+/// that tau points in; of a plateau exp(-lambda d max(0, |tau| - |o|)). In: tau -1..1; blend that
+/// isLearned(). Source: Kwak et al., MoRel, CVPR 2026 (arXiv 2512.09270), temporal opacity, whose
+/// figure shows the plateau and whose formula is the other.
+std::vector<float> fadingOf(const KeyFrame& frame, size_t count, double tau,
+                            KeyFrameBlend blend = KeyFrameBlend::kLearned);
 
 /// What one of two key frames counts at a time, of each anchor: w / (w + mean of the other's w).
 std::vector<float> sharesOf(const std::vector<float>& own, const std::vector<float>& other);
@@ -80,9 +87,10 @@ std::vector<float> sharesOf(const std::vector<float>& own, const std::vector<flo
 void sharesBackward(const std::vector<float>& own, const std::vector<float>& other,
                     const std::vector<float>& by_shares, std::vector<float>& by_own,
                     std::vector<float>& by_other);
-/// In: by_fading of fadingOf(frame, its size, tau). Out: by_blend [A,kBlendNumbers], added to.
+/// In: by_fading of fadingOf(frame, its size, tau, blend). Out: by_blend [A,kBlendNumbers], added
+/// to.
 void fadingBackward(const KeyFrame& frame, double tau, const std::vector<float>& by_fading,
-                    std::vector<float>& by_blend);
+                    std::vector<float>& by_blend, KeyFrameBlend blend = KeyFrameBlend::kLearned);
 
 /// Splats of key frames at a time.
 struct KeyFrameTape {

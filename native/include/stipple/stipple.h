@@ -2049,7 +2049,8 @@ typedef enum StippleFitShell {
 typedef enum StippleKeyFrameBlend {
   STIPPLE_BLEND_KEYS_LEARNED = 0, /* by what is learned of each anchor */
   STIPPLE_BLEND_KEYS_LINEAR = 1,
-  STIPPLE_BLEND_KEYS_NONE = 2     /* the nearer one is shown alone */
+  STIPPLE_BLEND_KEYS_NONE = 2,    /* the nearer one is shown alone */
+  STIPPLE_BLEND_KEYS_PLATEAU = 3  /* learned, and each anchor is whole until it begins to fade */
 } StippleKeyFrameBlend;
 
 typedef struct StippleFitOptions {
@@ -2096,6 +2097,11 @@ typedef struct StippleFitOptions {
   double key_frame_spacing;    /* relay: seconds between key frames, default 1 */
   uint32_t key_frame_blend;    /* relay: StippleKeyFrameBlend, default learned */
   uint32_t growth_by_level;    /* relay: 1, the default: anchors grow late where their features are varied */
+  double middle_level_rank;    /* relay: 0..1, share of anchors with less varied features than the middle level
+                                  has, default 0.5 */
+  double high_level_rank;      /* the same of the high level, at least as much, default 0.8 */
+  double middle_level_weight;  /* relay: 0..1 of the gradients that growth begins with, default 0.5 */
+  double high_level_weight;    /* the same of the high level, default 0.25 */
 } StippleFitOptions;
 void stipple_fit_options_init(StippleFitOptions* options);
 /* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.

@@ -32,7 +32,7 @@ double lastSecond(const RelayAssetHead& head) {
 void validateHead(const RelayAssetHead& head, const std::string& name, ErrorCode code) {
   const bool holds = std::isfinite(head.begin) && std::isfinite(head.frames_per_second) &&
                      head.frames_per_second > 0 && head.frame_count >= 1 && head.spacing >= 1 &&
-                     head.blend <= 2 && std::isfinite(lastSecond(head));
+                     head.blend <= 3 && std::isfinite(lastSecond(head));
   if (!holds) {
     fail(code, name + " has a clip of " + std::to_string(head.frame_count) + " frames at " +
                    numberText(head.frames_per_second) + " a second from " + numberText(head.begin) +
@@ -111,7 +111,7 @@ RelayAsset::RelayAsset(const std::string& path)
   head_.frames_per_second = numberOf(clip, "frames_per_second", path);
   head_.frame_count = wholeOf(clip, "frames", 1, kMostFrames, path);
   head_.spacing = wholeOf(clip, "spacing", 1, kMostFrames, path);
-  head_.blend = wholeOf(clip, "blend", 0, 2, path);
+  head_.blend = wholeOf(clip, "blend", 0, 3, path);
   head_.anchor_counts = file_->readUint64s(kCounts, 1);
   const Tensor bounds = file_->readTensor(kBounds);
   const auto* numbers = std::get_if<std::vector<double>>(&bounds.values);

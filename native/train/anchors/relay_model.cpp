@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/random.h"
 #include "base/stopwatch.h"
 #include "train/anchors/passing_places.h"
@@ -26,8 +27,6 @@ namespace stipple {
 
 namespace {
 
-/// Weights of growth by level at the begin of a segment; they rise to 1 at its end.
-constexpr std::array<double, 3> kLevelWeights = {1, 0.5, 0.25};
 /// Of the second half of the global stage and of windows, the share of steps that draw fewer
 /// anchors. All of them are needed for what is to be learned (docs/methods/relay.md).
 constexpr double kBudgetShare = 0.1;
@@ -40,6 +39,20 @@ constexpr double kPassingShare = 0.5;
 constexpr int kMeasuredOctaves = 2;
 /// Key frames that are kept at hand for drawing.
 constexpr size_t kShownKeyFrames = 2;
+
+void requireLevels(const RelayModelOptions& options) {
+  const auto& [low, high] = options.level_quantiles;
+  if (!(low >= 0 && low <= high && high <= 1)) {
+    fail(ErrorCode::kInvalidArgument, "levels begin at ranks of " + numberText(low) + " and " +
+                                          numberText(high) +
+                                          "; ranks of 0 to 1 are allowed, the lower one first");
+  }
+  for (const double weight : options.level_weights) {
+    if (weight >= 0 && weight <= 1) continue;
+    fail(ErrorCode::kInvalidArgument,
+         "a level has the weight " + numberText(weight) + "; 0 to 1 is allowed");
+  }
+}
 
 class RelayModel final : public FitModel {
  public:
@@ -220,7 +233,8 @@ class RelayModel final : public FitModel {
   void begin(KeyFrame frame) {
     work_ = workOn(std::move(frame));
     if (options_.grows_by_level) {
-      work_.state.levels = levelsOfFeatures(work_.state.scaffold->features);
+      work_.state.levels =
+          levelsOfFeatures(work_.state.scaffold->features, options_.level_quantiles);
     }
   }
 
@@ -329,8 +343,9 @@ class RelayModel final : public FitModel {
     AnchorGrowthLimits limits = {voxel_, options_.anchors.most_anchors, options_.anchors.seed};
     const double done =
         static_cast<double>(moment.iteration) / static_cast<double>(moment.iterations);
-    for (size_t level = 0; level < limits.level_weights.size(); ++level) {
-      limits.level_weights[level] = kLevelWeights[level] + (1 - kLevelWeights[level]) * done;
+    for (size_t i = 0; i < options_.level_weights.size(); ++i) {
+      const double first = options_.level_weights[i];
+      limits.level_weights[i + 1] = first + (1 - first) * done;
     }
     growAnchors(moment, limits, state);
     gradients_ = {};
@@ -347,7 +362,7 @@ class RelayModel final : public FitModel {
       for (size_t i = 0; i < 2; ++i) {
         splatsOfKeyFrame(*pair_[i], pair_[i]->scaffold.size(), taus[i], pair_tapes_[i],
                          pair_clouds_[i]);
-        fading[i] = fadingOf(*pair_[i], pair_[i]->scaffold.size(), taus[i]);
+        fading[i] = fadingOf(*pair_[i], pair_[i]->scaffold.size(), taus[i], options_.clip.blend);
         counts[i] = pair_clouds_[i].size();
       }
       shares[0] = sharesOf(fading[0], fading[1]);
@@ -372,7 +387,7 @@ class RelayModel final : public FitModel {
       sharesBackward(fading[1], fading[0], by_shares[1], by_fading[1], by_fading[0]);
       for (size_t i = 0; i < 2; ++i) {
         by_blend_[i].assign(pair_[i]->blend.size(), 0.0f);
-        fadingBackward(*pair_[i], taus[i], by_fading[i], by_blend_[i]);
+        fadingBackward(*pair_[i], taus[i], by_fading[i], by_blend_[i], options_.clip.blend);
       }
     }
     const TimedBlock watch(report.seconds.optimiser);
@@ -433,6 +448,7 @@ std::unique_ptr<FitModel> makeRelayModel(const BackendFactory& backends, const V
                                          const RelayModelOptions& options,
                                          std::shared_ptr<KeyFrameStore> store, Progress* progress) {
   validate(options.clip);
+  requireLevels(options);
   const ScaffoldStart start = startOfScaffold(views, training, options.anchors, progress);
   std::vector<double> times;
   for (const size_t view : training) times.push_back(views.time(view));

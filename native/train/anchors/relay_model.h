@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -18,6 +19,11 @@ struct RelayModelOptions {
   ScaffoldModelOptions anchors;  ///< of each key frame
   KeyFrameClip clip;
   bool grows_by_level = true;  ///< anchors with varied features grow late
+  /// Ranks of features, 0..1, at which the middle and the high level begin.
+  std::array<double, 2> level_quantiles = {0.5, 0.8};
+  /// By which gradients of these two levels count at the begin of a segment, 0..1; the weights rise
+  /// to 1 at its end.
+  std::array<double, 2> level_weights = {0.5, 0.25};
   uint64_t iterations = 30000;
 };
 

@@ -17,9 +17,6 @@ constexpr double kBlendShare = 0.1;
 /// Of a window, how often a view at the key frame is drawn for one at the next key frame.
 constexpr double kMostDraws = 4;
 
-constexpr double kLowQuantile = 0.5;
-constexpr double kHighQuantile = 0.8;
-
 }  // namespace
 
 FitMoment RelaySegment::local(const FitMoment& moment) const {
@@ -31,7 +28,7 @@ FitMoment RelaySegment::local(const FitMoment& moment) const {
 
 std::vector<RelaySegment> relaySegments(uint64_t iterations, const KeyFrameClip& clip) {
   const uint32_t keys = clip.keyCount();
-  const bool blends = clip.blend == KeyFrameBlend::kLearned && keys > 1;
+  const bool blends = isLearned(clip.blend) && keys > 1;
   const double blend_share = blends ? kBlendShare : 0;
   const double window_share = 1 - kGlobalShare - kKeyFrameShare - blend_share;
   std::vector<RelaySegment> segments;
@@ -85,7 +82,8 @@ std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameCl
   return views;
 }
 
-std::vector<uint8_t> levelsOfFeatures(std::span<const float> features) {
+std::vector<uint8_t> levelsOfFeatures(std::span<const float> features,
+                                      const std::array<double, 2>& quantiles) {
   const size_t count = features.size() / kScaffoldFeatures;
   if (count == 0) return {};
   std::vector<double> variances(count);
@@ -106,7 +104,7 @@ std::vector<uint8_t> levelsOfFeatures(std::span<const float> features) {
   std::vector<uint8_t> levels(count);
   for (size_t rank = 0; rank < count; ++rank) {
     const double share = static_cast<double>(rank) / static_cast<double>(count);
-    levels[order[rank]] = share < kLowQuantile ? 0 : share < kHighQuantile ? 1 : 2;
+    levels[order[rank]] = share < quantiles[0] ? 0 : share < quantiles[1] ? 1 : 2;
   }
   return levels;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -42,9 +43,10 @@ std::vector<RelaySegment> relaySegments(uint64_t iterations, const KeyFrameClip&
 std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameClip& clip,
                                    std::span<const double> times);
 
-/// Level of each anchor, by its rank in how much the numbers of its feature vary: of the lower half
-/// 0, of the upper fifth 2, else 1; ties go by the order of anchors. In: features
-/// [A,kScaffoldFeatures].
-std::vector<uint8_t> levelsOfFeatures(std::span<const float> features);
+/// Level of each anchor, by its rank in how much the numbers of its feature vary: 0 below the first
+/// quantile, 2 from the second one on, else 1; ties go by the order of anchors. In: features
+/// [A,kScaffoldFeatures]; quantiles 0..1, ascending.
+std::vector<uint8_t> levelsOfFeatures(std::span<const float> features,
+                                      const std::array<double, 2>& quantiles);
 
 }  // namespace stipple

@@ -95,14 +95,15 @@ TEST(KeyFrameBlending, FadesAsPublished) {
   }
 }
 
-TEST(KeyFrameBlending, GradientsAreThoseOfDifferences) {
+void compareWithDifferences(KeyFrameBlend blending) {
   KeyFrame before = someFrame(7, 1, false), behind = someFrame(5, 2, false);
   for (KeyFrame* frame : {&before, &behind}) {
     for (size_t i = 0; i < frame->blend.size(); ++i) frame->blend[i] += drawn(i + 50) - 0.5f;
   }
   const double tau = 0.35;
   const auto loss = [&] {
-    const std::vector<float> w = fadingOf(before, 7, tau), v = fadingOf(behind, 5, tau - 1);
+    const std::vector<float> w = fadingOf(before, 7, tau, blending),
+                             v = fadingOf(behind, 5, tau - 1, blending);
     double sum = 0;
     uint64_t number = 900;
     for (const auto& shares : {sharesOf(w, v), sharesOf(v, w)}) {
@@ -112,7 +113,8 @@ TEST(KeyFrameBlending, GradientsAreThoseOfDifferences) {
     }
     return sum;
   };
-  const std::vector<float> w = fadingOf(before, 7, tau), v = fadingOf(behind, 5, tau - 1);
+  const std::vector<float> w = fadingOf(before, 7, tau, blending),
+                           v = fadingOf(behind, 5, tau - 1, blending);
   std::vector<float> by_before_shares, by_behind_shares;
   uint64_t number = 900;
   for (size_t a = 0; a < 7; ++a) by_before_shares.push_back(drawn(number++) - 0.5f);
@@ -121,8 +123,8 @@ TEST(KeyFrameBlending, GradientsAreThoseOfDifferences) {
   sharesBackward(w, v, by_before_shares, by_w, by_v);
   sharesBackward(v, w, by_behind_shares, by_v, by_w);
   std::vector<float> by_before(before.blend.size(), 0.0f), by_behind(behind.blend.size(), 0.0f);
-  fadingBackward(before, tau, by_w, by_before);
-  fadingBackward(behind, tau - 1, by_v, by_behind);
+  fadingBackward(before, tau, by_w, by_before, blending);
+  fadingBackward(behind, tau - 1, by_v, by_behind, blending);
   const auto compare = [&](std::vector<float>& blend, const std::vector<float>& by) {
     for (size_t i = 0; i < blend.size(); ++i) {
       const float eps = 0x1.0p-7f;
@@ -139,6 +141,32 @@ TEST(KeyFrameBlending, GradientsAreThoseOfDifferences) {
   };
   compare(before.blend, by_before);
   compare(behind.blend, by_behind);
+}
+
+TEST(KeyFrameBlending, GradientsAreThoseOfDifferences) {
+  compareWithDifferences(KeyFrameBlend::kLearned);
+}
+
+TEST(KeyFrameBlending, GradientsOfPlateausAreThoseOfDifferences) {
+  compareWithDifferences(KeyFrameBlend::kPlateau);
+}
+
+TEST(KeyFrameBlending, APlateauIsWholeUntilItsOffset) {
+  KeyFrame frame = someFrame(1, 1, false);
+  const float raw = std::log(std::exp(0.25f) - 1);  // lambda d = 1
+  frame.blend = {0.4f, raw, -0.2f, raw};
+  const auto at = [&](double tau) { return fadingOf(frame, 1, tau, KeyFrameBlend::kPlateau)[0]; };
+  EXPECT_EQ(at(0), 1.0f);
+  EXPECT_EQ(at(0.4), 1.0f);
+  EXPECT_NEAR(at(0.9), std::exp(-0.5), 1e-6);
+  EXPECT_EQ(at(-0.2), 1.0f);
+  EXPECT_NEAR(at(-1), std::exp(-0.8), 1e-6);
+  // As all begin, with an offset of 0, it is the formula, and the offset learns.
+  frame.blend = {0, raw, 0, raw};
+  EXPECT_EQ(at(0.7), fadingOf(frame, 1, 0.7)[0]);
+  std::vector<float> by_blend(4, 0.0f);
+  fadingBackward(frame, 0.7, {1.0f}, by_blend, KeyFrameBlend::kPlateau);
+  EXPECT_GT(by_blend[0], 0.0f);
 }
 
 TEST(KeyFrameBlending, StaysFiniteWhereBothHaveFadedAway) {

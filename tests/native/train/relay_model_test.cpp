@@ -159,9 +159,10 @@ TEST(RelaySegments, LevelsFollowHowVariedFeaturesAre) {
   for (size_t a = 0; a < 10; ++a) {
     features[a * kScaffoldFeatures] = static_cast<float>(9 - a);  // the first is the most varied
   }
-  EXPECT_THAT(levelsOfFeatures(features), ElementsAre(2, 2, 1, 1, 1, 0, 0, 0, 0, 0));
+  EXPECT_THAT(levelsOfFeatures(features, {0.5, 0.8}), ElementsAre(2, 2, 1, 1, 1, 0, 0, 0, 0, 0));
   // All alike: by their order.
-  EXPECT_THAT(levelsOfFeatures(std::vector<float>(64, 0.5f)), ElementsAre(0, 1));
+  EXPECT_THAT(levelsOfFeatures(features, {0.9, 1.0}), ElementsAre(1, 0, 0, 0, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(levelsOfFeatures(std::vector<float>(64, 0.5f), {0.5, 0.8}), ElementsAre(0, 1));
 }
 
 TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
