@@ -41,9 +41,10 @@ make_zip() { # FOLDER of the sources
 }
 
 if [ $dependencies = --zig ]; then
-  # What a compiler's cache has to know of it: its kind, which the script does not tell, and that what is precompiled is
-  # content like any other.
-  export CCACHE_COMPILERTYPE=clang CCACHE_COMPILERCHECK=content CCACHE_SLOPPINESS=pch_defines,time_macros
+  # What a compiler's cache has to know of it: its kind, which the script does not tell, that what is precompiled is
+  # content like any other, and that the compiler says itself what it has read, so that no file is read twice.
+  export CCACHE_COMPILERTYPE=clang CCACHE_COMPILERCHECK=content CCACHE_DEPEND=1
+  export CCACHE_SLOPPINESS=pch_defines,time_macros
 fi
 bash native/install_dependencies.sh $dependencies
 jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}

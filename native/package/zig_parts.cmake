@@ -10,9 +10,12 @@ target_precompile_headers(stipple_flags INTERFACE <algorithm> <array> <cmath> <c
   <optional> <span> <string> <vector> <Eigen/Core> <Eigen/Geometry>)
 
 if(NOT APPLE)
+  add_library(stipple_settled_names OBJECT ${CMAKE_CURRENT_LIST_DIR}/settled_names.c
+    ${CMAKE_CURRENT_LIST_DIR}/stat_calls.c)
   # stipple_package_link(TARGET): links a library or a program for the package.
   function(stipple_package_link TARGET)
     set_target_properties(${TARGET} PROPERTIES BUILD_WITH_INSTALL_RPATH ON)
+    target_link_libraries(${TARGET} PRIVATE $<TARGET_OBJECTS:stipple_settled_names>)
     target_link_options(${TARGET} PRIVATE -Wl,--gc-sections -Wl,--build-id=none -Wl,-z,relro -Wl,-z,now -Wl,-s)
   endfunction()
   return()

@@ -129,7 +129,9 @@ def test_a_fit_comes_to_the_same(works):
 
 
 def test_errors_are_the_same_sentences(works):
-    assert works['arm64 said'] == [line.format(works['arm64']) for line in test_windows.SAID]
+    # Who may do everything writes what is read-only, too: what is said depends on who runs this.
+    said = [line.replace(str(works['x64']), str(works['arm64'])) for line in works['x64 said']]
+    assert len(said) == len(test_windows.SAID) and works['arm64 said'] == said
 
 
 @pytest.fixture(scope='module')
