@@ -95,12 +95,11 @@ TEST(KeyFrameBlending, FadesAsPublished) {
   }
 }
 
-void compareWithDifferences(KeyFrameBlend blending) {
+void compareWithDifferences(KeyFrameBlend blending, double tau) {
   KeyFrame before = someFrame(7, 1, false), behind = someFrame(5, 2, false);
   for (KeyFrame* frame : {&before, &behind}) {
     for (size_t i = 0; i < frame->blend.size(); ++i) frame->blend[i] += drawn(i + 50) - 0.5f;
   }
-  const double tau = 0.35;
   const auto loss = [&] {
     const std::vector<float> w = fadingOf(before, 7, tau, blending),
                              v = fadingOf(behind, 5, tau - 1, blending);
@@ -144,11 +143,12 @@ void compareWithDifferences(KeyFrameBlend blending) {
 }
 
 TEST(KeyFrameBlending, GradientsAreThoseOfDifferences) {
-  compareWithDifferences(KeyFrameBlend::kLearned);
+  compareWithDifferences(KeyFrameBlend::kLearned, 0.35);
 }
 
 TEST(KeyFrameBlending, GradientsOfPlateausAreThoseOfDifferences) {
-  compareWithDifferences(KeyFrameBlend::kPlateau);
+  // No plateau of these anchors ends within a step of the difference.
+  compareWithDifferences(KeyFrameBlend::kPlateau, 0.4);
 }
 
 TEST(KeyFrameBlending, APlateauIsWholeUntilItsOffset) {
