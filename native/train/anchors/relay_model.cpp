@@ -33,7 +33,7 @@ constexpr double kBudgetShare = 0.1;
 /// Of a window, the share of the rates of anchors: they are what the key frame has made them, and
 /// begin without moments.
 constexpr double kWindowRates = 0.1;
-/// Of all anchors that a key frame may have, those that begin at what passes.
+/// Anchors that begin at what passes take this share of those that a key frame may have at most.
 constexpr double kPassingShare = 0.5;
 /// Budgets that are measured, by octaves.
 constexpr int kMeasuredOctaves = 2;

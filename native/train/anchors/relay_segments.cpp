@@ -14,7 +14,7 @@ namespace {
 constexpr double kGlobalShare = 0.3;
 constexpr double kKeyFrameShare = 0.25;
 constexpr double kBlendShare = 0.1;
-/// Of a window, how often a view at the key frame is drawn for one at the next key frame.
+/// A window draws a view at its key frame so often while it draws one at the next key frame once.
 constexpr double kMostDraws = 4;
 
 }  // namespace
