@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <memory>
-#include <numeric>
 
 #include "decode/anchors/scaffold_decoder.h"
+#include "train/anchors/scaffold_steps.h"
 #include "train/prior/point_lives.h"
 #include "train/prior/start_splats.h"
 
@@ -60,10 +60,7 @@ std::vector<uint32_t> allButFaintest(const ScaffoldParameters& scaffold, size_t 
   for (size_t n = 0; n < tape.slots.size(); ++n) {
     opacities[tape.slots[n] / scaffold.gaussians] += static_cast<double>(cloud.opacities[n]);
   }
-  std::vector<uint32_t> rows(scaffold.size());
-  std::iota(rows.begin(), rows.end(), 0u);
-  std::stable_sort(rows.begin(), rows.end(),
-                   [&](uint32_t a, uint32_t b) { return opacities[a] > opacities[b]; });
+  std::vector<uint32_t> rows = orderOfWorth(opacities);
   rows.resize(rows.size() - std::min(dropped, rows.size()));
   std::sort(rows.begin(), rows.end());
   return rows;
