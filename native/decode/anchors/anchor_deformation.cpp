@@ -23,6 +23,19 @@ constexpr size_t kScalesAt = 3;
 constexpr size_t kFeaturesAt = kScalesAt + kScaffoldScales;
 constexpr size_t kOffsetsAt = kFeaturesAt + kScaffoldFeatures;
 
+/// What 1 of a head is at a time.
+struct HeadUnits {
+  float place;   ///< metres
+  float offset;  ///< in units of the anchor's lengths
+  float look;    ///< of lengths, which are logarithms, and features
+};
+
+HeadUnits unitsAt(const AnchorDeformation& deformation, double tau) {
+  const double moved = deformation.grows_from_key ? tau : 1.0;
+  return {static_cast<float>(moved * deformation.unit), static_cast<float>(moved),
+          static_cast<float>(std::abs(moved))};
+}
+
 }  // namespace
 
 uint64_t AnchorDeformation::bytes() const {
@@ -68,7 +81,7 @@ void deform(const AnchorDeformation& deformation, const AnchorArrays& anchors, s
   deformed.offsets.resize(count * offsets);
   const float* outputs = tape.heads.output().data();
   const size_t width = kOffsetsAt + offsets;
-  const auto unit = static_cast<float>(deformation.unit);
+  const HeadUnits units = unitsAt(deformation, tau);
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
     const auto add = [&](const std::vector<float>& from, std::vector<float>& to, size_t i,
                          size_t length, const float* by, float scale) {
@@ -76,10 +89,10 @@ void deform(const AnchorDeformation& deformation, const AnchorArrays& anchors, s
     };
     for (size_t i = begin; i < end; ++i) {
       const float* row = &outputs[i * width];
-      add(anchors.positions, deformed.positions, i, 3, row, unit);
-      add(anchors.log_scales, deformed.log_scales, i, kScaffoldScales, row + kScalesAt, 1);
-      add(anchors.features, deformed.features, i, kScaffoldFeatures, row + kFeaturesAt, 1);
-      add(anchors.offsets, deformed.offsets, i, offsets, row + kOffsetsAt, 1);
+      add(anchors.positions, deformed.positions, i, 3, row, units.place);
+      add(anchors.log_scales, deformed.log_scales, i, kScaffoldScales, row + kScalesAt, units.look);
+      add(anchors.features, deformed.features, i, kScaffoldFeatures, row + kFeaturesAt, units.look);
+      add(anchors.offsets, deformed.offsets, i, offsets, row + kOffsetsAt, units.offset);
     }
   });
 }
@@ -90,16 +103,19 @@ void deformBackward(const AnchorDeformation& deformation, const AnchorArrays& an
   const std::span<const float> places = {anchors.positions.data(), count * 3};
   const size_t offsets = anchors.size() == 0 ? 0 : anchors.offsets.size() / anchors.size();
   const size_t width = kOffsetsAt + offsets;
-  const auto unit = static_cast<float>(deformation.unit);
+  const HeadUnits units = unitsAt(deformation, tape.planes.tau);
   tape.head_gradient.resize(count * width);
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+    const auto take = [&](const std::vector<float>& from, size_t i, size_t length, float* to,
+                          float scale) {
+      for (size_t k = 0; k < length; ++k) to[k] = scale * from[i * length + k];
+    };
     for (size_t i = begin; i < end; ++i) {
       float* row = &tape.head_gradient[i * width];
-      for (size_t k = 0; k < 3; ++k) row[k] = unit * by_deformed.positions[i * 3 + k];
-      std::copy_n(&by_deformed.log_scales[i * kScaffoldScales], kScaffoldScales, row + kScalesAt);
-      std::copy_n(&by_deformed.features[i * kScaffoldFeatures], kScaffoldFeatures,
-                  row + kFeaturesAt);
-      std::copy_n(&by_deformed.offsets[i * offsets], offsets, row + kOffsetsAt);
+      take(by_deformed.positions, i, 3, row, units.place);
+      take(by_deformed.log_scales, i, kScaffoldScales, row + kScalesAt, units.look);
+      take(by_deformed.features, i, kScaffoldFeatures, row + kFeaturesAt, units.look);
+      take(by_deformed.offsets, i, offsets, row + kOffsetsAt, units.offset);
     }
   });
   if (gradients.heads.empty()) gradients.heads = deformation.heads.zeros();

@@ -14,6 +14,9 @@ struct AnchorDeformation {
   HexPlanes planes;
   Mlp heads;  ///< to [3 places | 6 scales | 32 features | 3 K offsets], the last layer of zeros
   double unit = 1;  ///< metres that 1 of a place's head is
+  /// Changes grow with the time from the key frame: places and offsets by tau, so that one number
+  /// is a velocity, lengths and features by |tau|. Else they are what the heads say at any time.
+  bool grows_from_key = true;
 
   bool isThere() const { return !heads.layers().empty(); }
   uint64_t bytes() const;

@@ -116,8 +116,8 @@ SplatCloud splatsOfClip(const KeyFrameClip& clip, const KeyFrameSource& frames, 
                         uint64_t budget);
 
 /// As named tensors behind a prefix: "PREFIXscaffold.*", "PREFIXplanes.P", "PREFIXheads.layerI.*",
-/// "PREFIXblend", PREFIXplanes, sizes of the planes, PREFIXbox, [7]: lowest 3, highest 3, unit, and
-/// where smaller budgets were learned PREFIXcoarsening.
+/// "PREFIXblend", PREFIXplanes, sizes of the planes, PREFIXbox, [8]: lowest 3, highest 3, unit, 1
+/// where changes grow from the key frame; where smaller budgets were learned PREFIXcoarsening.
 TensorTable tensorsOfKeyFrame(const KeyFrame& frame, const std::string& prefix);
 /// The other way round. Errors: kFormat.
 KeyFrame keyFrameOfTensors(const TensorTable& table, const std::string& prefix,

@@ -10,7 +10,8 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kBoxNumbers = 7;
+/// Corners and unit; files from before changes grew with the time have no eighth number.
+constexpr size_t kBoxNumbers = 8;
 
 Tensor rowsOf(const std::vector<float>& values, size_t width) {
   return {{values.size() / width, width}, values};
@@ -59,7 +60,8 @@ TensorTable tensorsOfKeyFrame(const KeyFrame& frame, const std::string& prefix) 
   table[prefix + "box"] = {
       {kBoxNumbers},
       std::vector<double>{shape.lowest[0], shape.lowest[1], shape.lowest[2], shape.highest[0],
-                          shape.highest[1], shape.highest[2], frame.deformation.unit}};
+                          shape.highest[1], shape.highest[2], frame.deformation.unit,
+                          frame.deformation.grows_from_key ? 1.0 : 0.0}};
   std::vector<uint32_t> sizes = {shape.texels, shape.moments, shape.channels};
   sizes.insert(sizes.end(), shape.multipliers.begin(), shape.multipliers.end());
   table[prefix + "planes"] = {{sizes.size()}, sizes};
@@ -98,7 +100,8 @@ KeyFrame keyFrameOfTensors(const TensorTable& table, const std::string& prefix,
   if (!own.contains("planes")) return frame;
   const std::vector<uint32_t>& sizes = valuesOf<uint32_t>(own, "planes");
   const std::vector<double>& box = valuesOf<double>(own, "box");
-  if (sizes.size() < 4 || box.size() != kBoxNumbers || !(box[6] > 0)) {
+  if (sizes.size() < 4 || (box.size() != kBoxNumbers && box.size() != kBoxNumbers - 1) ||
+      !(box[6] > 0)) {
     fail(ErrorCode::kFormat, "the key frame says not how large its planes are");
   }
   HexPlaneShape shape;
@@ -123,6 +126,7 @@ KeyFrame keyFrameOfTensors(const TensorTable& table, const std::string& prefix,
     fail(ErrorCode::kFormat, error.what());
   }
   frame.deformation.unit = box[6];
+  frame.deformation.grows_from_key = box.size() == kBoxNumbers && box[7] != 0;
   for (size_t p = 0; p < frame.deformation.planes.planes().size(); ++p) {
     take(own, "planes." + std::to_string(p), frame.deformation.planes.planes()[p].values);
   }

@@ -1,5 +1,6 @@
 #include "io/assets/relay_asset.h"
 
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -23,6 +24,14 @@ constexpr double kMostFrames = 1 << 24;
 
 std::string prefixOf(uint32_t key) {
   return "key." + std::to_string(key) + ".";
+}
+
+bool isOfKeyFrame(const std::string& name, size_t key_count) {
+  if (!name.starts_with("key.")) return false;
+  uint32_t key = 0;
+  const char* end = name.data() + name.size();
+  const auto [dot, error] = std::from_chars(name.data() + 4, end, key);
+  return error == std::errc() && dot != end && *dot == '.' && key < key_count;
 }
 
 double lastSecond(const RelayAssetHead& head) {
@@ -121,6 +130,9 @@ RelayAsset::RelayAsset(const std::string& path)
   std::copy(numbers->begin(), numbers->end(), head_.bounds.begin());
   head_.settings_json = requireText(*file_, "settings");
   validateHead(head_, path, ErrorCode::kFormat);
+  head_.extras.metadata = file_->metadata();
+  head_.extras.tensors = file_->readOthers(
+      [&](const std::string& name) { return isOfKeyFrame(name, head_.anchor_counts.size()); });
 }
 
 RelayAsset::~RelayAsset() = default;

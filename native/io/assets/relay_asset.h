@@ -27,7 +27,7 @@ struct RelayAssetHead {
   std::vector<uint64_t> anchor_counts;  ///< [keys]
   std::array<double, 6> bounds{};       ///< of all anchors: lowest 3, highest 3
   std::string settings_json = "{}";     ///< free for the caller (how it was made)
-  AssetExtras extras;                   ///< of the file that it was read from
+  AssetExtras extras;  ///< of the file that it was read from, but for tensors of key frames
 };
 
 /// `.stipple.safetensors`, version 1, kind "relay". In: key: tensors of a key frame, the same each

@@ -262,10 +262,11 @@ bool SafeTensorsReader::checksumIsRight(bool needs_one) const {
   return written->second == hexadecimal(sum.value());
 }
 
-std::map<std::string, CarriedTensor> SafeTensorsReader::readOthers() const {
+std::map<std::string, CarriedTensor> SafeTensorsReader::readOthers(
+    const std::function<bool(const std::string& name)>& is_left) const {
   std::map<std::string, CarriedTensor> others;
   for (const auto& [name, tensor] : tensors_) {
-    if (read_.count(name) != 0) continue;
+    if (read_.count(name) != 0 || (is_left && is_left(name))) continue;
     others[name] = {tensor.dtype, tensor.shape, readValues<uint8_t>(tensor)};
   }
   return others;

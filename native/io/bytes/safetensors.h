@@ -51,8 +51,9 @@ class SafeTensorsReader {
   /// Whether the bytes of the file are those that SafeTensorsWriter::addChecksum() saw. In:
   /// needs_one, whether a file without a checksum is wrong. Reads the whole file. Errors: kIo.
   bool checksumIsRight(bool needs_one) const;
-  /// The tensors that nobody has read yet.
-  std::map<std::string, CarriedTensor> readOthers() const;
+  /// The tensors that nobody has read yet, but for those that is_left accepts, where it is given.
+  std::map<std::string, CarriedTensor> readOthers(
+      const std::function<bool(const std::string& name)>& is_left = {}) const;
 
  private:
   template <typename T>

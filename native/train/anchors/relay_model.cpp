@@ -83,7 +83,14 @@ class RelayModel final : public FitModel {
       viewed_ = viewsOfSegment(segment, options_.clip, times_);
       order_.emplace(viewed_.size(), mixBits(options_.anchors.seed ^ index));
     }
-    return viewed_[order_->at(iteration - std::min(iteration, segment.begin))];
+    const uint64_t taken = iteration - std::min(iteration, segment.begin);
+    const double done =
+        static_cast<double>(taken) / static_cast<double>(segment.end - segment.begin);
+    const size_t count = viewsInReach(segment, options_.clip, times_, viewed_, done);
+    if (count == viewed_.size()) return viewed_[order_->at(taken)];
+    // Rounds of views that become more would not be even.
+    const uint64_t seed = mixBits(options_.anchors.seed ^ index) + 1;
+    return viewed_[keyedBits(seed, RandomUse::kViewOrder, taken) % count];
   }
 
   StepReport step(const FitMoment& moment, const StepView& view, ViewEvaluator*,

@@ -16,6 +16,15 @@ constexpr double kKeyFrameShare = 0.25;
 constexpr double kBlendShare = 0.1;
 /// A window draws a view at its key frame so often while it draws one at the next key frame once.
 constexpr double kMostDraws = 4;
+/// A window begins with what is so near to its key frame, in units of the spacing, and reaches all
+/// that it has after this share of its steps.
+constexpr double kFirstReach = 0.12;
+constexpr double kReachesAllAt = 0.7;
+
+/// In units of the spacing.
+double distanceOf(double time, const RelaySegment& segment, const KeyFrameClip& clip) {
+  return std::abs(time - clip.timeOf(segment.key)) * clip.frames_per_second / clip.spacing;
+}
 
 }  // namespace
 
@@ -64,14 +73,14 @@ std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameCl
     before = 0.5 * frame;
     behind = (clip.spacing + 0.5) * frame;
   }
+  const bool is_window = segment.stage == RelayStage::kWindow;
   std::vector<size_t> views;
   double nearest = INFINITY;
   for (size_t v = 0; v < times.size(); ++v) {
     const double apart = times[v] - middle;
     if (apart >= -before && apart <= behind) {
-      const double tau = std::abs(apart) / (clip.spacing * frame);
-      const bool is_window = segment.stage == RelayStage::kWindow;
-      const double draws = is_window ? std::ceil(kMostDraws * (1 - tau)) : 1;
+      const double draws =
+          is_window ? std::ceil(kMostDraws * (1 - distanceOf(times[v], segment, clip))) : 1;
       views.insert(views.end(), static_cast<size_t>(std::max(1.0, draws)), v);
     }
     nearest = std::min(nearest, std::abs(apart));
@@ -79,7 +88,22 @@ std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameCl
   for (size_t v = 0; views.empty() && v < times.size(); ++v) {
     if (std::abs(times[v] - middle) <= nearest) views.push_back(v);
   }
+  if (is_window) {
+    std::stable_sort(views.begin(), views.end(), [&](size_t a, size_t b) {
+      return distanceOf(times[a], segment, clip) < distanceOf(times[b], segment, clip);
+    });
+  }
   return views;
+}
+
+size_t viewsInReach(const RelaySegment& segment, const KeyFrameClip& clip,
+                    std::span<const double> times, std::span<const size_t> views, double done) {
+  if (segment.stage != RelayStage::kWindow || done >= kReachesAllAt) return views.size();
+  const double reach = std::max(kFirstReach, done / kReachesAllAt);
+  const auto beyond = std::upper_bound(views.begin(), views.end(), reach, [&](double at, size_t v) {
+    return at < distanceOf(times[v], segment, clip);
+  });
+  return std::max<size_t>(1, static_cast<size_t>(beyond - views.begin()));
 }
 
 std::vector<uint8_t> levelsOfFeatures(std::span<const float> features,

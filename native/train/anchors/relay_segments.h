@@ -38,10 +38,17 @@ struct RelaySegment {
 std::vector<RelaySegment> relaySegments(uint64_t iterations, const KeyFrameClip& clip);
 
 /// The views that a segment learns from, as places in `times`: those in its span of time; where
-/// there is none, the nearest. Windows have those near the key frame more than once, as it counts
-/// for less the nearer the next one is. In: times of the views, seconds, at least one.
+/// there is none, the nearest. Windows have those near the key frame first, and more than once, as
+/// it counts for less the nearer the next one is. In: times of the views, seconds, at least one.
 std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameClip& clip,
                                    std::span<const double> times);
+
+/// How many of viewsOfSegment(), the first of them, a step draws from. A window reaches further
+/// from its key frame with every step: an anchor follows what moves for as long as it overlaps it,
+/// and where it is shown another place too early, it learns to fade instead. In: done 0..1, the
+/// share of the segment's steps. Returns: at least 1.
+size_t viewsInReach(const RelaySegment& segment, const KeyFrameClip& clip,
+                    std::span<const double> times, std::span<const size_t> views, double done);
 
 /// Level of each anchor, by its rank in how much the numbers of its feature vary: 0 below the first
 /// quantile, 2 from the second one on, else 1; ties go by the order of anchors. In: features

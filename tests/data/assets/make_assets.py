@@ -150,20 +150,62 @@ def motion(name, *more):
            'settings': '{"seed": 42, "time": {"begin": 0.5, "end": 2.5}}', 'provenance': 'written by hand'}, tensors)
 
 
-def scaffold():
-    anchors, gaussians, degree = 3, 2, 1
-    tensors = {'scaffold.positions': f32(numbers(anchors, 3, 1)), 'scaffold.features': f32(numbers(anchors, 32, 2)),
-               'scaffold.log_scales': f32(numbers(anchors, 6, 3)),
-               'scaffold.offsets': f32(numbers(anchors, 3 * gaussians, 4)),
-               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+def anchors_of(count, gaussians, first=1):
+    return {'scaffold.positions': f32(numbers(count, 3, first)), 'scaffold.features': f32(numbers(count, 32, 2)),
+            'scaffold.log_scales': f32(numbers(count, 6, 3)),
+            'scaffold.offsets': f32(numbers(count, 3 * gaussians, 4))}
+
+
+def networks_of_anchors(gaussians, degree):
+    tensors = {}
     for number, (name, outputs) in enumerate((('opacity', gaussians), ('covariance', 7 * gaussians),
                                               ('colour', 3 * (degree + 1)**2 * gaussians))):
         for layer, (inputs, width) in enumerate(((32, 32), (32, outputs))):
             tensors[f'scaffold.{name}.layer{layer}.weights'] = f32(numbers(inputs, width, number - 48))
             tensors[f'scaffold.{name}.layer{layer}.biases'] = f32(numbers(width, 1, layer)[:, 0])
+    return tensors
+
+
+def scaffold():
+    gaussians, degree = 2, 1
+    tensors = anchors_of(3, gaussians)
+    tensors['future.labels'] = 'I16', numpy.array([[1, -2], [300, 4]], '<i2')
+    tensors.update(networks_of_anchors(gaussians, degree))
     write('scaffold_1.0.stipple.safetensors',
           {'stipple_version': '1.0', 'kind': 'scaffold', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
            'frame': 'right-handed, z up, metres', 'K': str(gaussians), 'sh_degree': str(degree),
+           'settings': '{"seed": 42}', 'provenance': 'written by hand'}, tensors)
+
+
+def relay():
+    """Two key frames of a clip of nine frames: the first deforms, the other stands still and has a learned budget."""
+    gaussians, degree, counts = 2, 1, [3, 2]
+    texels, moments, channels, multipliers = 2, 4, 2, [1, 2]
+    tensors = {'relay.anchor_counts': u64(counts),
+               'relay.bounds': ('F64', numpy.array([[-1.5, 0.25, 0], [2, 3, 4]], '<f8')),
+               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    for key, count in enumerate(counts):
+        known = anchors_of(count, gaussians, 1 + 10 * key) | networks_of_anchors(gaussians, degree)
+        tensors.update({f'key.{key}.{name}': tensor for name, tensor in known.items()})
+        tensors[f'key.{key}.blend'] = f32(numbers(count, 4, 5 + key))
+    tensors['key.0.planes'] = 'U32', numpy.array([texels, moments, channels, *multipliers], '<u4')
+    tensors['key.0.box'] = 'F64', numpy.array([-2, -1, 0, 2, 3, 4, 0.5], '<f8')
+    plane = 0
+    for scale in multipliers:
+        for first, second in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)):
+            width, height = (moments if axis == 3 else texels * scale for axis in (first, second))
+            values = numbers(height * width, channels, plane).reshape(height, width, channels)
+            tensors[f'key.0.planes.{plane}'] = f32(values)
+            plane += 1
+    widths = [channels * len(multipliers), 64, 64, 3 + 6 + 32 + 3 * gaussians]
+    for layer, (inputs, width) in enumerate(zip(widths, widths[1:])):
+        tensors[f'key.0.heads.layer{layer}.weights'] = f32(numbers(inputs, width, layer - 96))
+        tensors[f'key.0.heads.layer{layer}.biases'] = f32(numbers(width, 1, layer)[:, 0])
+    tensors['key.1.coarsening'] = 'F64', numpy.array([0.5], '<f8')
+    write('relay_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'relay', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
+           'frame': 'right-handed, z up, metres', 'K': str(gaussians), 'sh_degree': str(degree),
+           'clip': '{"begin": 0.5, "frames": 9, "frames_per_second": 4, "spacing": 4, "blend": 3}',
            'settings': '{"seed": 42}', 'provenance': 'written by hand'}, tensors)
 
 
@@ -178,3 +220,4 @@ if __name__ == '__main__':
            {'tree.parents': ('U32', numpy.array([2**32 - 1, 0, 0, 1, 1], '<u4')),
             'tree.errors': f32(numpy.array([0.75, 0.5], '<f4'))})
     scaffold()
+    relay()

@@ -168,9 +168,38 @@ TEST(AnchorDeformation, StartsAsNothingAtAnyTime) {
   }
 }
 
-TEST(AnchorDeformation, GradientsAreThoseOfDifferences) {
+TEST(AnchorDeformation, IsNothingAtItsKeyFrameWhateverWasLearned) {
   const ScaffoldParameters anchors = someAnchors(30);
   AnchorDeformation deformation = makeDeformation(smallShape(), 3);
+  for (float& bias : deformation.heads.layers().back().biases) bias = 0.25f;
+  const auto at = [&](double tau) {
+    DeformationTape tape;
+    AnchorArrays deformed;
+    deform(deformation, anchors, 30, tau, tape, deformed);
+    return deformed;
+  };
+  EXPECT_EQ(at(0).positions, anchors.positions);
+  EXPECT_EQ(at(0).features, anchors.features);
+  EXPECT_EQ(at(0).log_scales, anchors.log_scales);
+  EXPECT_EQ(at(0).offsets, anchors.offsets);
+  // One number is a velocity, and a look that changes does so on both sides.
+  const auto changeOf = [&](const std::vector<float>& values, const std::vector<float>& rest) {
+    return static_cast<double>(values[7] - rest[7]);
+  };
+  const double step = changeOf(at(0.5).positions, anchors.positions);
+  EXPECT_NEAR(step, 0.125 * deformation.unit, 1e-6);  // float32 of places about 1
+  EXPECT_NEAR(changeOf(at(-1).positions, anchors.positions), -2 * step, 1e-6);
+  EXPECT_NEAR(changeOf(at(-0.5).offsets, anchors.offsets), -0.125, 1e-6);
+  EXPECT_NEAR(changeOf(at(-0.5).features, anchors.features), 0.125, 1e-6);
+  EXPECT_NEAR(changeOf(at(0.5).log_scales, anchors.log_scales), 0.125, 1e-6);
+}
+
+class DeformationDerivatives : public testing::TestWithParam<bool> {};
+
+TEST_P(DeformationDerivatives, AreThoseOfDifferences) {
+  const ScaffoldParameters anchors = someAnchors(30);
+  AnchorDeformation deformation = makeDeformation(smallShape(), 3);
+  deformation.grows_from_key = GetParam();
   deformation.planes = livelyPlanes();
   for (size_t i = 0; i < deformation.heads.layers().back().weights.size(); ++i) {
     deformation.heads.layers().back().weights[i] = drawn(300 + i) - 0.5f;
@@ -234,6 +263,8 @@ TEST(AnchorDeformation, GradientsAreThoseOfDifferences) {
   }
   EXPECT_GT(compared, 300u);
 }
+
+INSTANTIATE_TEST_SUITE_P(WithAndWithoutTime, DeformationDerivatives, testing::Bool());
 
 }  // namespace
 }  // namespace stipple

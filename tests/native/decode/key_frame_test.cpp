@@ -262,6 +262,25 @@ TEST(KeyFrame, ComesBackFromTensorsBitForBit) {
   }
 }
 
+TEST(KeyFrame, DecodesFilesFromBeforeChangesGrewWithTheTime) {
+  KeyFrame frame = someFrame(5, 4, true);
+  TensorTable table = tensorsOfKeyFrame(frame, "");
+  auto& box = std::get<std::vector<double>>(table.at("box").values);
+  ASSERT_EQ(box.size(), 8u);
+  box.pop_back();
+  table.at("box").shape = {7};
+  const ScaffoldShape shape = {3, 0, frame.scaffold.colour_space, frame.scaffold.antialias, 0};
+  const KeyFrame seen = keyFrameOfTensors(table, "", shape);
+  EXPECT_FALSE(seen.deformation.grows_from_key);
+  frame.deformation.grows_from_key = false;
+  KeyFrameTape tapes[2];
+  SplatCloud one, other;
+  splatsOfKeyFrame(frame, 5, -0.6, tapes[0], one);
+  splatsOfKeyFrame(seen, 5, -0.6, tapes[1], other);
+  EXPECT_EQ(one.positions, other.positions);
+  EXPECT_EQ(one.sh, other.sh);
+}
+
 TEST(KeyFrame, RefusesTensorsThatDoNotFitTogether) {
   const KeyFrame frame = someFrame(5, 4, true);
   const ScaffoldShape shape = {3, 0, frame.scaffold.colour_space, frame.scaffold.antialias, 0};
@@ -280,6 +299,9 @@ TEST(KeyFrame, RefusesTensorsThatDoNotFitTogether) {
   refuses("planes", {{5}, std::vector<uint32_t>{4, 4, 2, 1, 4000000}});
   refuses("planes.0", {{1}, std::vector<float>(1)});
   refuses("box", {{7}, std::vector<double>{0, 0, 0, 0, 1, 1, 1}});
+  refuses("box", {{6}, std::vector<double>{0, 0, 0, 1, 1, 1}});
+  refuses("box", {{8}, std::vector<double>{0, 0, 0, 1, 1, 1, 0, 1}});
+  refuses("box", {{9}, std::vector<double>{0, 0, 0, 1, 1, 1, 1, 1, 1}});
   refuses("heads.layer2.biases", {{1}, std::vector<float>{NAN}});
 }
 

@@ -9,6 +9,7 @@
 #include "io/assets/hierarchy_asset.h"
 #include "io/assets/latent_asset.h"
 #include "io/assets/motion_asset.h"
+#include "io/assets/relay_asset.h"
 #include "io/assets/scaffold_asset.h"
 #include "io/assets/surface_asset.h"
 #include "scratch_folder.h"
@@ -232,6 +233,43 @@ TEST_F(GoldenAssets, ReadsAnchorsWithFeaturesOfVersion1AndKeepsAllOfThem) {
     expectExtras(asset.extras);
     writeScaffoldAsset(asset, path("again"));
     asset = readScaffoldAsset(path("again"));
+  }
+}
+
+TEST_F(GoldenAssets, ReadsKeyFramesOfVersion1AndKeepsAllOfThem) {
+  std::string file = golden("relay_1.0");
+  for (int time = 0; time < 2; ++time) {
+    const RelayAsset asset(file);
+    const RelayAssetHead& head = asset.head();
+    EXPECT_EQ(head.begin, 0.5);
+    EXPECT_EQ(head.frames_per_second, 4);
+    EXPECT_EQ(head.frame_count, 9u);
+    EXPECT_EQ(head.spacing, 4u);
+    EXPECT_EQ(head.blend, 3u);
+    EXPECT_EQ(head.gaussians, 2u);
+    EXPECT_EQ(head.sh_degree, 1);
+    EXPECT_EQ(head.anchor_counts, (std::vector<uint64_t>{3, 2}));
+    EXPECT_EQ(head.bounds, (std::array<double, 6>{-1.5, 0.25, 0, 2, 3, 4}));
+    expectExtras(head.extras);
+    const TensorTable first = asset.key(0);
+    const TensorTable second = asset.key(1);
+    const auto floatsOf = [](const TensorTable& table, const char* name) {
+      return std::get<std::vector<float>>(table.at(name).values);
+    };
+    EXPECT_EQ(floatsOf(first, "scaffold.positions"), numbers(3, 3, 1));
+    EXPECT_EQ(floatsOf(second, "scaffold.positions"), numbers(2, 3, 11));
+    EXPECT_EQ(floatsOf(second, "blend"), numbers(2, 4, 6));
+    EXPECT_EQ(floatsOf(first, "planes.6"), numbers(16, 2, 6));
+    EXPECT_EQ(first.at("planes.8").shape, (std::vector<uint64_t>{4, 4, 2}));
+    EXPECT_EQ(std::get<std::vector<double>>(first.at("box").values).size(), 7u);
+    EXPECT_EQ(floatsOf(first, "heads.layer2.weights"), numbers(64, 47, -94));
+    EXPECT_EQ(std::get<std::vector<double>>(second.at("coarsening").values),
+              std::vector<double>{0.5});
+    EXPECT_EQ(first.size(), 4u + 3 * 4 + 3 + 12 + 6);
+    EXPECT_EQ(second.size(), 4u + 3 * 4 + 2);
+    writeRelayAsset(
+        head, [&](uint32_t key) { return asset.key(key); }, path("again"));
+    file = path("again");
   }
 }
 

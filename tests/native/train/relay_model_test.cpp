@@ -141,7 +141,7 @@ TEST(RelaySegments, LearnFromTheViewsOfTheirTime) {
   };
   EXPECT_EQ(framesOf(RelayStage::kGlobal, 0).size(), 25u);
   EXPECT_THAT(framesOf(RelayStage::kKeyFrame, 1), ElementsAre(7u, 8u, 9u));
-  EXPECT_EQ(framesOf(RelayStage::kWindow, 1).front(), 0u);
+  EXPECT_EQ(framesOf(RelayStage::kWindow, 1).front(), 8u) << "the nearest first";
   EXPECT_EQ(framesOf(RelayStage::kWindow, 1).back(), 16u);
   const std::vector<size_t> window = framesOf(RelayStage::kWindow, 1);
   EXPECT_EQ(std::count(window.begin(), window.end(), 8u), 4) << "the key frame";
@@ -152,6 +152,34 @@ TEST(RelaySegments, LearnFromTheViewsOfTheirTime) {
   // Key frames without views take the nearest.
   times = {0.0, 0.1, 2.4};
   EXPECT_THAT(framesOf(RelayStage::kKeyFrame, 1), ElementsAre(1u));
+}
+
+TEST(RelaySegments, WindowsReachFurtherWithEveryStep) {
+  const KeyFrameClip clip = clipOf(25, 8, KeyFrameBlend::kLearned);
+  std::vector<double> times;
+  for (int frame = 0; frame < 25; ++frame) times.push_back(0.1 * frame);
+  const RelaySegment window = {RelayStage::kWindow, 1, 0, 100};
+  const std::vector<size_t> views = viewsOfSegment(window, clip, times);
+  const auto furthest = [&](double done) {
+    const size_t count = viewsInReach(window, clip, times, views, done);
+    size_t most = 0;
+    for (size_t i = 0; i < count; ++i) {
+      most = std::max(most, views[i] > 8 ? views[i] - 8 : 8 - views[i]);
+    }
+    return most;
+  };
+  EXPECT_EQ(furthest(0.0), 0u) << "the key frame alone: the next is an eighth of the spacing away";
+  EXPECT_EQ(furthest(0.1), 1u);
+  EXPECT_EQ(furthest(0.35), 4u);
+  EXPECT_EQ(furthest(0.7), 8u);
+  EXPECT_EQ(viewsInReach(window, clip, times, views, 1.0), views.size());
+  // Other stages have all of their views at once, and a window without a near one has the nearest.
+  const RelaySegment global = {RelayStage::kGlobal, 0, 0, 100};
+  const std::vector<size_t> all = viewsOfSegment(global, clip, times);
+  EXPECT_EQ(viewsInReach(global, clip, times, all, 0.0), 25u);
+  times = {0.0, 1.6};
+  const std::vector<size_t> few = viewsOfSegment(window, clip, times);
+  EXPECT_EQ(viewsInReach(window, clip, times, few, 0.0), 1u);
 }
 
 TEST(RelaySegments, LevelsFollowHowVariedFeaturesAre) {
