@@ -30,9 +30,6 @@ namespace {
 /// Of the second half of the global stage and of windows, the share of steps that draw fewer
 /// anchors. All of them are needed for what is to be learned (docs/methods/relay.md).
 constexpr double kBudgetShare = 0.1;
-/// Of a window, the share of the rates of anchors: they are what the key frame has made them, and
-/// begin without moments.
-constexpr double kWindowRates = 0.1;
 /// Anchors that begin at what passes take this share of those that a key frame may have at most.
 constexpr double kPassingShare = 0.5;
 /// Budgets that are measured, by octaves.
@@ -342,7 +339,7 @@ class RelayModel final : public FitModel {
     }
     {
       const TimedBlock watch(report.seconds.optimiser);
-      learnAnchors(moment, gradients_, state, is_window ? kWindowRates : 1.0);
+      learnAnchors(moment, gradients_, state);
       if (is_window) learnDeformation(moment, deformation_gradients_, work_);
     }
     if (!growsAnchors(moment)) return;

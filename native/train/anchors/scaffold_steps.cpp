@@ -171,8 +171,8 @@ double regulariseSizes(const FitMoment& moment, const SplatCloud& cloud,
   return weight * sum;
 }
 
-void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients, ScaffoldState& state,
-                  double share) {
+void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients,
+                  ScaffoldState& state) {
   ScaffoldParameters& scaffold = *state.scaffold;
   std::vector<AdamGroup> groups;
   size_t next = 0;
@@ -181,7 +181,7 @@ void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients, S
     Moments& both = state.moments[next++];
     if (values.empty()) return;
     groups.push_back({values.data(), by.data(), both.first.data(), both.second.data(),
-                      values.size(), 1, share * rateAt(rate, moment)});
+                      values.size(), 1, rateAt(rate, moment)});
   };
   add(scaffold.features, gradients.anchors.features, kFeatureRate);
   add(scaffold.log_scales, gradients.anchors.log_scales, kScaleRate);

@@ -38,9 +38,9 @@ void observeAnchors(const ViewStatistics& statistics, const Camera& camera,
 double regulariseSizes(const FitMoment& moment, const SplatCloud& cloud,
                        SplatCloud& cloud_gradient);
 
-/// One step of Adam for anchors and networks. In: share, of the rates.
-void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients, ScaffoldState& state,
-                  double share = 1);
+/// One step of Adam for anchors and networks.
+void learnAnchors(const FitMoment& moment, const ScaffoldGradients& gradients,
+                  ScaffoldState& state);
 
 struct AnchorGrowthLimits {
   double voxel = 1e-3;        ///< metres
