@@ -13,6 +13,11 @@ bl_info = {
 
 import bpy
 
+from . import late
+
+# Before the other imports: the rooms that they come to ask this one, too, for modules.
+__getattr__ = late.room(__name__)
+
 from . import cycles_engine, engine, operators, panels, preferences, properties, selection_tools
 from .viewport import drawing, selected_points, stroke_preparation, view_world
 from .scene.source import source_travel, sync

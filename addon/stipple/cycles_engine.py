@@ -10,10 +10,9 @@ import functools
 import bpy
 import numpy as np
 
-from . import cycles_functions, version
+from . import binding, cycles_functions, version
+from .binding import structs
 from .binding.errors import CancelledError, StippleError
-from .binding.renderer import Renderer
-from .binding.structs import OutputColour, Status
 from .cycles_functions import CyclesRender
 from .engine import NativeWork
 from .scene.source import sources, splat_data
@@ -96,7 +95,7 @@ def _make_engine():
             try:
                 refused = cycles_functions.denoising_problem(depsgraph.scene, depsgraph.view_layer)
                 if refused:
-                    raise StippleError(refused, Status.ERROR_UNAVAILABLE)
+                    raise StippleError(refused, structs.Status.ERROR_UNAVAILABLE)
                 self._take_instances(depsgraph)
                 if self._instances:
                     facts.refuse_stereo(depsgraph.scene.render)
@@ -174,7 +173,7 @@ def _make_engine():
         def _insert_splats(self, passes, picture, camera, shadow, shadow_margin):
             matte = mattes.surface(self._holdouts, camera, self._wait) if self._holdouts else None
             cycles = self._layers_of(passes, picture, matte)
-            renderer = Renderer(sources.context())
+            renderer = binding.renderer.Renderer(sources.context())
             self._say_memory(renderer, self._instances, camera)
             if shadow is not None:
                 version.fill_pass(passes[_SHADOW_PASS], shadow)
@@ -207,7 +206,7 @@ def _make_engine():
 
         def _light_what_is_before_catchers(self, cycles, renderer, picture, camera, margin):
             """Takes the shadows off splats that are nearer than a catcher by more than the margin."""
-            options = renderer.options(blend_space=picture.blend_space, output_colour=OutputColour.COMPOSITED,
+            options = renderer.options(blend_space=picture.blend_space, output_colour=structs.OutputColour.COMPOSITED,
                                        accuracy=self._exactness, object_order=self._order)
 
             def drawn(surface):

@@ -9,14 +9,13 @@ import time
 import bpy
 import numpy as np
 
-from . import cycles_world, version
+from . import binding, cycles_world, version
+from .binding import structs
 from .binding.errors import CancelledError, StippleError
-from .binding.renderer import Renderer
-from .binding.structs import JobState
 from .scene import instances
 from .scene.source import sources
 from .scene.view import cameras, effects, facts, mattes, motion, picture_options, quality, steady_effects
-from .viewport.drawing import ViewImage
+from .viewport import view_image
 
 # How often a render looks whether it was cancelled.
 POLL_SECONDS = 0.01
@@ -31,7 +30,7 @@ class NativeWork:
         """Until the job ends; a cancel in Blender cancels it."""
         while True:
             state, fraction, stage = job.poll()
-            if state != JobState.RUNNING:
+            if state != structs.JobState.RUNNING:
                 job.wait()
                 return
             if self._cancelled():
@@ -165,7 +164,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
                 world = cycles_world.image(self, depsgraph, picture.border, blur is not None)
                 if world is None:
                     return
-            renderer = Renderer(sources.context())
+            renderer = binding.renderer.Renderer(sources.context())
             self._say_memory(renderer, self._instances, camera)
             options = renderer.options(blend_space=picture.blend_space,
                                        background=picture.background if world is None else None, accuracy=accuracy,
@@ -184,7 +183,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
     def view_update(self, context, depsgraph):
         """Something in the scene of a 3D view has changed."""
         if getattr(self, '_view', None) is None:
-            self._view = ViewImage()
+            self._view = view_image.ViewImage()
         self._guarded(self._view.update, depsgraph, self._warn)
 
     def view_draw(self, context, depsgraph):

@@ -9,8 +9,8 @@ operator ends with one undo step.
 import threading
 import time
 
+from .binding import structs
 from .binding.errors import CancelledError, StippleError
-from .binding.structs import JobState
 from .scene.source import sources
 
 POLL_SECONDS = 0.05
@@ -31,11 +31,11 @@ class Task:
     def poll(self):
         """(state, fraction 0..1, stage). Never waits."""
         if self._thread.is_alive():
-            return (JobState.RUNNING, *self._progress)
+            return (structs.JobState.RUNNING, *self._progress)
         if self._error is None:
-            return JobState.DONE, 1.0, self._progress[1]
+            return structs.JobState.DONE, 1.0, self._progress[1]
         cancelled = isinstance(self._error, CancelledError)
-        return (JobState.CANCELLED if cancelled else JobState.FAILED, *self._progress)
+        return (structs.JobState.CANCELLED if cancelled else structs.JobState.FAILED, *self._progress)
 
     def cancel(self):
         self._cancelled.set()
@@ -61,7 +61,7 @@ class Task:
         the stage that is shown, None for the job's own."""
         while True:
             state, fraction, stage = job.poll()
-            if state != JobState.RUNNING:
+            if state != structs.JobState.RUNNING:
                 job.wait()
                 return job
             if self._cancelled.is_set():
@@ -157,7 +157,7 @@ class JobOperator:
             self._is_shown = True
             return {'PASS_THROUGH'}
         state, fraction, stage = self._job.poll()
-        if state == JobState.RUNNING:
+        if state == structs.JobState.RUNNING:
             self._say(context, fraction, stage)
             return {'PASS_THROUGH'}
         self._leave_window(context)

@@ -5,14 +5,12 @@ import bpy
 from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty,
                        IntVectorProperty, PointerProperty, StringProperty)
 
-from . import version
+from . import choices, version
 from .binding.errors import StippleError
 from .scene import overlays, selection_settings
 from .scene.fit import fit_proposal, fitting, strategies
-from .scene.sequence import sequences
-from .scene.source import (bound, mesh_models, setting_paths, source_paths, source_settings, sources, splat_data,
-                           sync)
-from .scene.view import effects, photo_cameras, quality
+from .scene.source import mesh_models, setting_paths, source_paths, source_settings, sources, splat_data, sync
+from .scene.view import photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}
@@ -52,6 +50,10 @@ class STIPPLE_PG_source_object(bpy.types.PropertyGroup):
 
 class STIPPLE_PG_source_file(bpy.types.PropertyGroup):
     file: PointerProperty(name="File", type=bpy.types.Image)
+
+
+def _on_overlay_change(settings, context):
+    overlays.on_change(settings, context)
 
 
 def _on_sequence_change(stipple, context):
@@ -146,13 +148,13 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                                default=1.0, soft_min=-4.0, soft_max=4.0, options=set(), override=_OVERRIDABLE,
                                update=sync.on_property_change)
     sequence_mode: EnumProperty(name="Mode", description="What is shown before the first and after the last file",
-                                items=sequences.MODES, options=set(), override=_OVERRIDABLE,
+                                items=choices.SERIES_MODES, options=set(), override=_OVERRIDABLE,
                                 update=sync.on_property_change)
     time_mode: EnumProperty(name="Mode", description="What splats that move do before and after their clip",
                             items=TIME_MODES, options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
     missing_frames: EnumProperty(name="Missing Files", description="What happens where a file of the series is "
                                                                    "missing",
-                                 items=sequences.GAPS, options=set(), override=_OVERRIDABLE,
+                                 items=choices.SERIES_GAPS, options=set(), override=_OVERRIDABLE,
                                  update=sync.on_property_change)
     # The colour grade: limits are those of the native library.
     exposure: FloatProperty(name="Exposure", description="Brightness in stops, +1 doubles the light of every splat",
@@ -178,7 +180,7 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     bind_rest: PointerProperty(type=bpy.types.Mesh, options={'HIDDEN'})  # its shape when they were bound
     bind_rest_render: PointerProperty(type=bpy.types.Mesh, options={'HIDDEN'})  # in renders, where they differ
     bind_reach: EnumProperty(name="Bind", description="Which part of the mesh each splat follows",
-                             items=bound.REACHES, options={'HIDDEN'})
+                             items=choices.REACHES, options={'HIDDEN'})
     bind_matrix: FloatVectorProperty(size=16, options={'HIDDEN'})  # from the mesh's space to the splats', row by row
     bind_topology: StringProperty(options={'HIDDEN'})  # of its faces
     bind_topology_render: StringProperty(options={'HIDDEN'})
@@ -329,15 +331,15 @@ class STIPPLE_PG_overlay(bpy.types.PropertyGroup):
     """What the 3D view colours splats by."""
 
     kind: EnumProperty(name="Color By", description="Quantity that colors the splats in the 3D view, to examine "
-                                                    "density control", items=overlays.KINDS, options=set(),
-                       update=overlays.on_change)
+                                                    "density control", items=choices.OVERLAYS, options=set(),
+                       update=_on_overlay_change)
     auto_range: BoolProperty(name="Auto Range", description="The color range goes from the lowest to the highest "
                                                             "value that is shown, without a few extremes", default=True,
-                             options=set(), update=overlays.on_change)
+                             options=set(), update=_on_overlay_change)
     low: FloatProperty(name="From", description="Value of the darkest color", default=0.0, options=set(),
-                       update=overlays.on_change)
+                       update=_on_overlay_change)
     high: FloatProperty(name="To", description="Value of the brightest color", default=1.0, options=set(),
-                        update=overlays.on_change)
+                        update=_on_overlay_change)
 
 
 def _on_level_change(self, _context):
@@ -403,21 +405,21 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     view_color: EnumProperty(
         name="View-Dependent Color", description="Colors change with the direction of the view. Auto uses the degree "
                                                  "of harmonics that carries 99.9 % of the change",
-                                                 items=effects.CHOICES, options=set(),
+                                                 items=choices.EFFECT_SWITCHES, options=set(),
         override=_OVERRIDABLE)
     exact_projection: EnumProperty(
         name="Exact Projection", description="Splats are drawn along the rays of the pixels instead of as flat "
                                              "ellipses. Auto does so where ellipses are wrong by more than a pixel",
-                                             items=effects.CHOICES, options=set(), override=_OVERRIDABLE)
+                                             items=choices.EFFECT_SWITCHES, options=set(), override=_OVERRIDABLE)
     zoom_antialiasing: EnumProperty(
         name="Zoom Anti-Aliasing", description="Splats smaller than pixels keep their light. Auto does so where the "
                                                "low-pass that they were trained with makes them twice as large",
-                                               items=effects.CHOICES, options=set(),
+                                               items=choices.EFFECT_SWITCHES, options=set(),
         override=_OVERRIDABLE)
     global_order: EnumProperty(
         name="Global Ordering", description="Splats of all objects are sorted together. Off draws each object as a "
                                             "whole, with farther ones behind it. Auto sorts them together where "
-                                            "objects share a range of depth", items=effects.CHOICES,
+                                            "objects share a range of depth", items=choices.EFFECT_SWITCHES,
         options=set(), override=_OVERRIDABLE)
     blur_samples: IntProperty(
         name="Blur Samples", description="Number of images that depth of field and motion blur average; 0 chooses as "

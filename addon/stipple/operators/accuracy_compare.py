@@ -5,10 +5,8 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty
 
-from ..binding.image import Image
-from ..binding.renderer import Renderer
-from ..binding.structs import AccuracyLevel
-from ..binding import accuracy as native
+from .. import binding
+from ..binding import accuracy as native, structs
 from ..jobs import JobOperator, Task
 from ..scene.fit import fit_reports
 from ..scene.source import sources
@@ -43,11 +41,11 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
     def start(self, context):
         view = rendered_view.gather(context)
         owner = sources.context()
-        renderer = Renderer(owner)
+        renderer = binding.renderer.Renderer(owner)
         chosen = []
         for side in (self.first, self.second):
             if side == 'REFERENCE':
-                accuracy = native.accuracy(owner.library, AccuracyLevel.REFERENCE)
+                accuracy = native.accuracy(owner.library, structs.AccuracyLevel.REFERENCE)
             else:
                 accuracy = quality.accuracy_of(owner.library, quality.column(context.scene, side), view.rows)
             chosen.append(renderer.options(blend_space=view.picture.blend_space,
@@ -60,7 +58,7 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
                 task.run(made.job, place / 2, (place + 1) / 2)
                 pictures.append(made.colour)
             # The judge of measurements, over all pixels.
-            judged = [Image.create(owner, picture) for picture in pictures]
+            judged = [binding.image.Image.create(owner, picture) for picture in pictures]
             return pictures, judged[0].compare(judged[1]).psnr
 
         return Task(work)

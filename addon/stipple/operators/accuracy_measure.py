@@ -4,9 +4,8 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..binding.accuracy import AccuracyMeasurement
+from .. import binding
 from ..binding.errors import StippleError
-from ..binding.renderer import Renderer
 from ..jobs import JobOperator
 from ..scene.fit import fit_reports
 from ..scene.source import sources
@@ -41,10 +40,10 @@ class STIPPLE_OT_accuracy_measure(JobOperator, bpy.types.Operator):
     def start(self, context):
         self._scene = context.scene
         view = rendered_view.gather(context)
-        render = Renderer(sources.context()).options(blend_space=view.picture.blend_space,
-                                                     background=view.picture.background)
-        return AccuracyMeasurement.start(sources.context(), view.placed, view.camera, render,
-                                         repetitions=self.repetitions, max_seconds=self.most_seconds)
+        render = binding.renderer.Renderer(sources.context()).options(blend_space=view.picture.blend_space,
+                                                                      background=view.picture.background)
+        return binding.accuracy.AccuracyMeasurement.start(sources.context(), view.placed, view.camera, render,
+                                                          repetitions=self.repetitions, max_seconds=self.most_seconds)
 
     def finish(self, context, job):
         report = job.report()

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty
 
-from ..binding.model import Model
+from .. import binding
 from ..jobs import JobOperator, Task
 from ..scene import geometry
 from ..scene.source import bound, decoded, masks, source_paths, source_settings, sources, splat_data, sync
@@ -34,7 +34,7 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
         path = source_paths.place_for(obj.name)
 
         def work(task):
-            model = Model.of_job(task.run(Model.from_cloud_start(native, cloud), 0.0, 0.9))
+            model = binding.model.Model.of_job(task.run(binding.model.Model.from_cloud_start(native, cloud), 0.0, 0.9))
             task.advance(0.9, 'Writing the tree')
             return model, sources.save_model(model, path), cloud.info().count
         return Task(work)

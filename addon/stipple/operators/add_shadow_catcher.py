@@ -5,9 +5,8 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
+from .. import binding
 from ..binding import cloud_edit
-from ..binding.mesh import Mesh
-from ..binding.volume import Volume
 from ..jobs import JobOperator, Task
 from ..scene.source import placement, proxies, sources, splat_data
 
@@ -79,8 +78,9 @@ class STIPPLE_OT_add_shadow_catcher(JobOperator, bpy.types.Operator):
         native, resolution, threshold = sources.context(), self.resolution, self.threshold
 
         def work(task):
-            volume = Volume.of_job(task.run(Volume.voxelize_start(native, instances, resolution, 0.0), 0.0, 0.6))
-            mesh = Mesh.of_job(task.run(volume.mesh_start(threshold, 0.0, True), 0.6, 0.95))
+            voxels = task.run(binding.volume.Volume.voxelize_start(native, instances, resolution, 0.0), 0.0, 0.6)
+            volume = binding.volume.Volume.of_job(voxels)
+            mesh = binding.mesh.Mesh.of_job(task.run(volume.mesh_start(threshold, 0.0, True), 0.6, 0.95))
             task.advance(0.95, 'Reading the mesh')
             return (*mesh.read(), volume.info().voxel_size)
         return work

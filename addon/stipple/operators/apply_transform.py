@@ -4,9 +4,9 @@
 import bpy
 from mathutils import Matrix
 
+from .. import binding
 from ..binding import cloud_edit
 from ..binding.errors import invalid
-from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene.sequence import frames
 from ..scene.source import edits, placement, source_paths, source_settings, sources, sync
@@ -42,9 +42,9 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
                 task.advance(i / len(wanted), 'Moving splats')
                 cloud, tree = cloud_edit.merge([(target.cloud, matrix)], frames.WORLD), None
                 if has_budget:
-                    job = task.run(Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted),
+                    job = task.run(binding.model.Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted),
                                    (i + 1) / len(wanted))
-                    tree = sources.save_model(Model.of_job(job), path)
+                    tree = sources.save_model(binding.model.Model.of_job(job), path)
                 moved.append((target, cloud, tree))
             return moved
         return Task(work)

@@ -6,6 +6,7 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 
 from ..binding.errors import StippleError, invalid
+from .. import choices
 from ..scene.source import bound, decoded, edits, placement, sources, splat_data, sync
 
 
@@ -40,7 +41,7 @@ class STIPPLE_OT_bind_to_mesh(bpy.types.Operator):
     bl_label = "Bind to Mesh"
     bl_options = {'REGISTER', 'UNDO'}
 
-    reach: EnumProperty(name="Bind", description="Which part of the mesh each splat follows", items=bound.REACHES,
+    reach: EnumProperty(name="Bind", description="Which part of the mesh each splat follows", items=choices.REACHES,
                         default='SURFACE')
     parent: BoolProperty(name="Parent", description="The splats become a child of the mesh, so that they go where its "
                          "object goes", default=True)

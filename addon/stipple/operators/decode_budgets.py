@@ -6,8 +6,8 @@ import time
 
 import bpy
 
+from ..binding import structs
 from ..binding.errors import CancelledError, StippleError
-from ..binding.structs import Status
 from ..jobs import JobOperator, Task
 from ..scene.source import cloud_cache, decoded, exporting, frame_budgets, source_settings, sources, splat_data
 
@@ -41,7 +41,7 @@ class STIPPLE_OT_decode_budgets(JobOperator, bpy.types.Operator):
             raise StippleError(f"{self._what()} take {exporting.megabytes(self._size)}, and at most "
                                f"{exporting.megabytes(kept)} are kept; choose a larger Budget Cache (or Memory Limit) "
                                "in Preferences > Add-ons > Stipple, fewer frames, or smaller budgets.",
-                               Status.ERROR_MEMORY_LIMIT)
+                               structs.Status.ERROR_MEMORY_LIMIT)
         decoder, allowed = decoded.Decoder(data), sources.context().memory_limit()
         return Task(lambda task: self._work(task, decoder, allowed))
 
@@ -55,7 +55,7 @@ class STIPPLE_OT_decode_budgets(JobOperator, bpy.types.Operator):
             needed = self._size + max(model.decode_memory_bound(one) for one in settings)
             if needed > allowed:
                 raise StippleError(f"{self._what()} and their decoding take {exporting.megabytes(needed)}; the memory "
-                                   f"limit is {exporting.megabytes(allowed)}.", Status.ERROR_MEMORY_LIMIT)
+                                   f"limit is {exporting.megabytes(allowed)}.", structs.Status.ERROR_MEMORY_LIMIT)
             for i, one in enumerate(settings):
                 part, stage = (ends[i] / ends[-1], ends[i + 1] / ends[-1]), f'budget {i + 1} of {len(settings)}'
                 task.advance(part[0], stage)

@@ -9,7 +9,7 @@ from ..binding import cloud_edit
 from ..jobs import JobOperator
 from ..scene.source import placement, sources, splat_data
 from ..scene.view import picking
-from ..viewport.picked_points import PickedPoints
+from ..viewport import picked_points
 
 
 class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.Operator):
@@ -19,7 +19,6 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
     bl_label = "Level to Ground"
     bl_options = {'REGISTER', 'UNDO'}
 
-    marks_of = PickedPoints
     point_count = 3
     use_points: BoolProperty(name="Pick Points", description="Three points of the floor, instead of a search for it",
                              default=False)
@@ -31,6 +30,9 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
     @classmethod
     def poll(cls, context):
         return splat_data.is_splat_object(context.object) and context.mode == 'OBJECT'
+
+    def marks_of(self, picked):
+        return picked_points.PickedPoints(picked)
 
     def start(self, context):
         if self.use_points:

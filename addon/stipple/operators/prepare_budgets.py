@@ -2,18 +2,17 @@
 """Every file of a series gets its tree of merges, in a folder beside the .blend."""
 
 import os
-import shutil
 
 import bpy
 
-from ..binding.cloud import Cloud
+from .. import binding, late
+from ..binding import structs
 from ..binding.errors import StippleError, invalid
-from ..binding.model import Model
-from ..binding.structs import Status
 from ..jobs import JobOperator, Task
 from ..scene.sequence import numbered, sequences
 from ..scene.source import source_paths, source_settings, sources, splat_data, sync
 
+shutil = late.module('shutil')
 
 class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
     """Make a tree of merges for every file of the series and keep them beside the .blend: budgets then show the least
@@ -52,13 +51,14 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
                 for i, number in enumerate(numbers):
                     part = (i / len(numbers), (i + 1) / len(numbers))
                     task.advance(part[0], f'File {i + 1} of {len(numbers)}')
-                    cloud = Cloud.load(native, first.path(number))
-                    model = Model.of_job(task.run(Model.from_cloud_start(native, cloud), *part))
+                    cloud = binding.cloud.Cloud.load(native, first.path(number))
+                    made = task.run(binding.model.Model.from_cloud_start(native, cloud), *part)
+                    model = binding.model.Model.of_job(made)
                     model.save(os.path.join(folder, f'{name}_{number:04d}{sources.MODEL_SUFFIX}'))
                 return _rename(folder, stem), len(numbers), name
             except OSError as error:
                 raise StippleError(f"The folder '{folder}' cannot be written: {error.strerror}.",
-                                   Status.ERROR_IO) from None
+                                   structs.Status.ERROR_IO) from None
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
         return Task(work)

@@ -5,9 +5,8 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ..binding.cloud import Cloud
+from .. import binding
 from ..binding.errors import StippleError, invalid
-from ..binding.model import Model
 from ..jobs import JobOperator
 from ..scene.sequence import numbered
 from ..scene.source import (decoded, formats, masks, selections, source_paths, source_settings, sources, splat_data,
@@ -118,7 +117,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
 
 def _noun(stipple):
     """What the files of a source are."""
-    return Model if source_settings.of(stipple).has_budget else Cloud
+    return binding.model.Model if source_settings.of(stipple).has_budget else binding.cloud.Cloud
 
 
 def _count_before(data):

@@ -9,7 +9,7 @@ from ..binding import cloud_edit
 from ..jobs import JobOperator
 from ..scene.source import placement, sources, splat_data
 from ..scene.view import picking
-from ..viewport.picked_points import PickedPoints
+from ..viewport import picked_points
 
 
 class STIPPLE_OT_set_scale(picking.PointOperator, JobOperator, bpy.types.Operator):
@@ -19,7 +19,6 @@ class STIPPLE_OT_set_scale(picking.PointOperator, JobOperator, bpy.types.Operato
     bl_label = "Set Scale"
     bl_options = {'REGISTER', 'UNDO'}
 
-    marks_of = PickedPoints
     point_count = 2
     use_points = True
     points: FloatVectorProperty(name="Points", size=6, options={'SKIP_SAVE', 'HIDDEN'})
@@ -29,6 +28,9 @@ class STIPPLE_OT_set_scale(picking.PointOperator, JobOperator, bpy.types.Operato
     @classmethod
     def poll(cls, context):
         return splat_data.is_splat_object(context.object) and context.mode == 'OBJECT'
+
+    def marks_of(self, picked):
+        return picked_points.PickedPoints(picked)
 
     def start(self, _context):
         matrix = cloud_edit.scale_points(sources.context().library, self.points, self.length)

@@ -9,9 +9,8 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..binding.cloud import Cloud, SplatArrays, save_scene
+from .. import binding, choices
 from ..binding.errors import invalid
-from ..binding.series_writer import SeriesWriter
 from ..jobs import JobOperator, Task
 from ..preferences import UP_AXES
 from ..scene.sequence import frames, frames_out, numbered
@@ -46,12 +45,13 @@ class OneFile:
     def __init__(self, context, path, options):
         render = context.scene.render
         self._native = sources.context()
-        self._writer = SeriesWriter.create(self._native, path, render.fps / render.fps_base, **options)
+        self._writer = binding.series_writer.SeriesWriter.create(self._native, path, render.fps / render.fps_base,
+                                                                 **options)
 
     def add_nothing(self, number):
-        nothing = SplatArrays(*(np.empty((0, width), np.float32) for width in (3, 4, 3)), np.empty(0, np.float32),
-                              np.empty((0, 1, 3), np.float32))
-        self._writer.add(Cloud.create(self._native, nothing), number)
+        nothing = binding.cloud.SplatArrays(*(np.empty((0, width), np.float32) for width in (3, 4, 3)),
+                                            np.empty(0, np.float32), np.empty((0, 1, 3), np.float32))
+        self._writer.add(binding.cloud.Cloud.create(self._native, nothing), number)
 
     def add(self, cloud, number):
         self._writer.add(cloud, number)
@@ -93,7 +93,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
                             description="Highest degree of the colors' harmonics that is written, 0 for "
                                         "colors that do not change with the view", default=4, min=0, max=4)
     frames: EnumProperty(name="Frames", description="Which frames are written, each to a file of its own, or all to "
-                         "one file of USD", items=frames_out.FRAMES, options={'SKIP_SAVE'})
+                         "one file of USD", items=choices.FRAMES_OUT, options={'SKIP_SAVE'})
     one_file: BoolProperty(name="One File", description="Write all frames into one file that plays, as time samples, "
                            "and not each to a file of its own (.usda, .usd, .usdz)", default=True)
     ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
@@ -145,7 +145,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
                 placed, frame = clouds
                 # What shows nothing now is no prim, as it adds nothing to joined splats.
                 shown = [(name, *one) for name, one in zip(names, placed) if one[0].info().count > 0]
-                save_scene(shown, path, frame, **options)
+                binding.cloud.save_scene(shown, path, frame, **options)
                 return sum(cloud.info().count for cloud, _matrix in placed)
             task.advance(0.0, 'Joining splats')
             cloud = exporting.joined(clouds)

@@ -4,11 +4,9 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from .. import version
-from ..binding.cloud import Cloud
+from .. import binding, version
+from ..binding import structs
 from ..binding.errors import invalid
-from ..binding.model import DecodeSettings
-from ..binding.structs import AnchorOrder
 from ..jobs import JobOperator
 from ..panels.text import draw_anchors, draw_color_from
 from ..properties import BAKE_SAMPLES_TEXT, BAKE_SIZE_TEXT, BAKE_VIEWS_TEXT, COLOR_SOURCES, ORDERS
@@ -66,14 +64,14 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
     def finish(self, context, job):
         model = mesh_models.model_of(job)
         # Decoding and writing the source go on side by side; a budget that is refused is refused before the file.
-        decoding = model.decode_start(DecodeSettings(model.settings().maximum_budget) if self.refine
+        decoding = model.decode_start(binding.model.DecodeSettings(model.settings().maximum_budget) if self.refine
                                       else self._settings())
         active = context.view_layer.objects.active
         name = (active if active in self._objects else self._objects[0]).name + ' Splats'
         path = sources.save_model(model, source_paths.place_for(name, self.source_path), bool(self.source_path))
         sources.remember_model(path, model)
         decoding.wait()
-        splats = Cloud.of_job(decoding).columns()
+        splats = binding.cloud.Cloud.of_job(decoding).columns()
         obj = splat_data.new_object(name, splat_data.new_data(name))
         stipple = obj.data.stipple
         with sync.paused():
@@ -103,7 +101,8 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
             layout.prop(self, name)
 
     def _settings(self):
-        return DecodeSettings(self.anchors, self.gaussians_per_anchor, AnchorOrder[self.order], self.seed)
+        return binding.model.DecodeSettings(self.anchors, self.gaussians_per_anchor, structs.AnchorOrder[self.order],
+                                            self.seed)
 
     def _select(self, context, obj):
         for source in self._objects:

@@ -8,10 +8,8 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProp
 from bpy_extras.io_utils import ImportHelper
 from mathutils import Matrix
 
-from .. import preferences, version
-from ..binding.cloud import Cloud
+from .. import binding, preferences, version
 from ..binding.errors import StippleError
-from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene.sequence import frames, numbered, sequences
 from ..scene.source import formats, source_settings, sources, splat_data, sync
@@ -134,8 +132,8 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
 def _read(native, path):
     """(splats, model of an asset file or None)."""
     if not path.lower().endswith(sources.MODEL_SUFFIX):
-        return Cloud.load(native, path).columns(), None
-    model = Model.load(native, path)
+        return binding.cloud.Cloud.load(native, path).columns(), None
+    model = binding.model.Model.load(native, path)
     return model.decode(sources.first_settings(model.settings())).columns(), model
 
 

@@ -4,8 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ..binding.mesh import Mesh
-from ..binding.volume import Volume
+from .. import binding
 from ..jobs import JobOperator, Task
 from ..scene.source import placement, proxies, sources, splat_data
 
@@ -58,8 +57,9 @@ class STIPPLE_OT_splats_to_mesh(JobOperator, bpy.types.Operator):
         settings = (self.threshold, self.adaptivity, self.largest_only)
 
         def work(task):
-            volume = Volume.of_job(task.run(Volume.voxelize_start(native, instances, resolution, voxel_size), 0.0, 0.6))
-            mesh = Mesh.of_job(task.run(volume.mesh_start(*settings), 0.6, 0.95))
+            voxels = task.run(binding.volume.Volume.voxelize_start(native, instances, resolution, voxel_size), 0.0, 0.6)
+            volume = binding.volume.Volume.of_job(voxels)
+            mesh = binding.mesh.Mesh.of_job(task.run(volume.mesh_start(*settings), 0.6, 0.95))
             task.advance(0.95, 'Reading the mesh')
             return (*mesh.read(), volume.info().voxel_size)
         return Task(work)

@@ -7,8 +7,8 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from .. import binding, choices
 from ..binding.errors import invalid
-from ..binding.volume import Volume
 from ..jobs import JobOperator, Task
 from ..scene import volumes
 from ..scene.sequence import frames_out, numbered
@@ -30,7 +30,7 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
     voxel_size: FloatProperty(name="Voxel Size", description="Side of a voxel, 0 to take the resolution", default=0.0,
                               soft_min=0.0, subtype='DISTANCE', unit='LENGTH', precision=4)
     frames: EnumProperty(name="Frames", description="Which frames become volumes, each in a file of its own",
-                         items=frames_out.FRAMES, options={'SKIP_SAVE'})
+                         items=choices.FRAMES_OUT, options={'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context):
@@ -52,13 +52,13 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
         depsgraph = context.evaluated_depsgraph_get()
         objects = [obj.evaluated_get(depsgraph) for obj in selected]
         instances = [(sources.cloud_from_object(obj), placement.matrix_of(obj)) for obj in objects]
-        return Volume.voxelize_start(sources.context(), instances, self.resolution, self.voxel_size)
+        return binding.volume.Volume.voxelize_start(sources.context(), instances, self.resolution, self.voxel_size)
 
     def _start_series(self, context, objects):
         frames = frames_out.gather(context, objects, self.frames, 'VIEWPORT')
         native, path, resolution, voxel_size = sources.context(), self._path, self.resolution, self.voxel_size
         # Refuses settings out of range before any file is read.
-        Volume.check_settings(resolution, voxel_size)
+        binding.volume.Volume.check_settings(resolution, voxel_size)
         self._timing = volumes.Timing(frames[0].number, len(frames), frames[0].number - 1, 'CLIP')
         if self.frames == 'SERIES':
             stipple = objects[0].data.stipple
@@ -80,7 +80,8 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
                 clouds = frame.clouds(native)
                 if not clouds:
                     continue
-                volume = Volume.of_job(task.run(Volume.voxelize_start(native, clouds, resolution, size), *part))
+                voxels = task.run(binding.volume.Volume.voxelize_start(native, clouds, resolution, size), *part)
+                volume = binding.volume.Volume.of_job(voxels)
                 written.append(numbered.frame_path(path, frame.number))
                 volume.save(written[-1])
                 size = volume.info().voxel_size
@@ -96,7 +97,7 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
             volumes.new_object(name, written[0], context.collection, size, self._timing)
             self.report({'INFO'}, f"{len(written)} volumes of {size:.4g} m voxels from '{written[0]}' on")
             return
-        volume = Volume.of_job(job)
+        volume = binding.volume.Volume.of_job(job)
         volume.save(self._path)
         info = volume.info()
         volumes.new_object(name, self._path, context.collection, info.voxel_size)

@@ -3,8 +3,8 @@
 
 import bpy
 
+from .. import binding
 from ..binding.errors import invalid
-from ..binding.model import DecodeSettings
 from ..jobs import JobOperator
 from ..scene import bake, meshes
 from ..scene.source import bound, erased, mesh_models, source_paths, source_settings, sources, splat_data, sync
@@ -33,7 +33,8 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         made = self._made = mesh_models.made_with(stipple)
         self._settings = sources.decode_settings(stipple)
         if self._changes_kind:
-            self._settings = DecodeSettings(made.anchors * made.gaussians_per_anchor) if stipple.refine else made
+            splat_count = made.anchors * made.gaussians_per_anchor
+            self._settings = binding.model.DecodeSettings(splat_count) if stipple.refine else made
         self._settings.check()
         self._sources = [entry.object for entry in stipple.source_objects if entry.object is not None]
         if not self._sources:

@@ -7,6 +7,7 @@ Shape Keys and all else that meshes have.
 
 import bpy
 
+from .. import choices
 from . import source_state
 from ..scene import geometry
 from ..scene.source import (bound, decoded, erased, exporting, frame_budgets, masks, source_settings, sources,
@@ -99,7 +100,7 @@ class STIPPLE_PT_binding(_SplatPanel, bpy.types.Panel):
         column = layout.column()
         name = stipple.bind_object.name if stipple.bind_object is not None else "nothing: the mesh is gone"
         column.label(text=f"Bound to {name}", icon='MOD_MESHDEFORM')
-        reach = next(text for key, text, _ in bound.REACHES if key == stipple.bind_reach)
+        reach = next(text for key, text, _ in choices.REACHES if key == stipple.bind_reach)
         _draw_fixed(column, "Bind", reach)
         column.enabled = not stipple.edited
         column.prop(stipple, 'bind_follow')

@@ -4,7 +4,6 @@
 import bpy
 
 from ..binding.errors import StippleError
-from ..binding.structs import Effect
 from ..scene.source import sources
 from ..scene.view import effects
 from .render import SplatRenderPanel

@@ -13,8 +13,6 @@ from . import meshes, shapes
 from .fit import view_rigs
 from .source import placement, sources, splat_data
 
-RESULTS = (('SHAPE_KEY', "Shape Key", "The new shape is a shape key of the mesh, at a value of 1. The other shape keys "
-            "go to 0"), ('APPLY', "Apply", "The vertices of the mesh move; its old shape is not kept"))
 _UNSEEN = {'ARMATURE', 'CAMERA', 'LATTICE', 'LIGHT', 'LIGHT_PROBE', 'SPEAKER'}
 
 

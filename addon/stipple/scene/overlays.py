@@ -16,14 +16,6 @@ from ..binding.structs import ColourSpace, SplatQuantity
 from .source import sources, splat_data
 from .view import viewed
 
-KINDS = (('OFF', "Off", "Splats have their own colors"),
-         ('SCORE', "Score", "How much each splat asked to multiply at the last event. Most strategies count in "
-                            "thresholds, where a splat with 1 multiplies"),
-         ('AGE', "Age", "Iterations of the fit since each splat was made; for densified splats, events"),
-         ('SPLIT_AXIS', "Split Axis",
-          "Direction of the longest axis, along which a splat would be split: red, green and "
-          "blue for X, Y and Z of the object, grey where the splat is round"),
-         ('CONTRIBUTION', "Contribution", "Pixels that each splat fills in a view"))
 UNITS = {'SCORE': "in the strategy's units", 'AGE': "iterations, or events", 'CONTRIBUTION': "pixels"}
 # Equally spaced anchors of the colour map viridis (S. van der Walt, N. Smith, CC0), display values.
 _MAP = np.array([[.267, .005, .329], [.283, .141, .458], [.254, .265, .530], [.207, .372, .553], [.164, .471, .558],

@@ -1,2 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splats drawn in the 3D view."""
+
+from .. import late
+
+__getattr__ = late.room(__name__)

@@ -7,25 +7,19 @@ points. From Blender 5.3 on splats are data that Blender draws by itself. The en
 ViewImage instead.
 """
 
-import logging
-
 import bpy
 from bpy.app.handlers import persistent
 
-from .. import preferences, version
+from .. import log, preferences, version
 from ..binding.errors import StippleError
 from ..scene import overlays
 from ..scene.source import sources, sync
 from ..scene.view import viewed
-from .view_image import ViewImage
-
-__all__ = ('ViewImage', 'register', 'unregister')
 
 POLL_SECONDS = 0.01
 # 3D views that keep their order of splats; more than a screen usually has.
 MAX_VIEWS = 8
 
-log = logging.getLogger('stipple')
 _state = {'handler': None, 'legend_handler': None, 'drawing': None}
 
 

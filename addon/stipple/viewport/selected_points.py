@@ -2,15 +2,13 @@
 """Points over the centres of selected splats, all of the source and not just those that the budget shows; while a stroke
 is being drawn, over what it would select."""
 
-import logging
-
 import bpy
 import gpu
 from bpy.app.handlers import persistent
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
-from .. import version
+from .. import late, log, version
 from ..binding.errors import StippleError
 from ..scene.source import selecting, selections
 from ..scene.view import drawn_regions, viewed
@@ -19,7 +17,6 @@ from ..scene.view import drawn_regions, viewed
 MAX_POINTS = 200_000
 POINT_SIZE_PX = 3.0
 
-log = logging.getLogger('stipple')
 _state = {'handler': None, 'drawing': None, 'off': False}
 _instead = {}  # {name of the data: (number, centres)} that are drawn in place of a selection
 
@@ -100,8 +97,9 @@ def _forget(*_):
     """Another file: what is known of this one goes."""
     _state.update(drawing=None, off=False)
     _instead.clear()
-    selecting.forget()
-    drawn_regions.forget()
+    for module in (selecting, drawn_regions):
+        if late.is_loaded(module):
+            module.forget()
 
 
 def register():

@@ -11,11 +11,8 @@ import time
 
 import numpy as np
 
-from ..binding import cloud_edit
-from ..binding.accuracy import accuracy as accuracy_of_level
-from ..binding.grade import GradedCloud
-from ..binding.renderer import Renderer
-from ..binding.structs import AccuracyLevel, JobState, Projection
+from .. import binding
+from ..binding import cloud_edit, structs
 from ..scene import instances
 from ..scene.source import sources
 from ..scene.view import cameras, effects, facts, mattes, picture_options, quality, view_mattes, viewed
@@ -142,7 +139,7 @@ class ViewImage:
         """Starts the image of the border's pixels with one pixel for coarse x coarse of them, the average of so many
         images at most."""
         if self._renderer is None:
-            self._renderer = Renderer(sources.context())
+            self._renderer = binding.renderer.Renderer(sources.context())
         is_plain = self._world is None and not scene.render.film_transparent
         background = facts.world_colour(scene.world) if is_plain else None
         around = None if self._world is None else self._world.pixels
@@ -172,8 +169,8 @@ class ViewImage:
         settings, library = scene.stipple.quality_viewport, self._renderer.library
         if coarse > 1 and settings.level not in QUICK_LEVELS:
             # Panoramas are not there but along rays.
-            return accuracy_of_level(library, AccuracyLevel.FINAL,
-                                     projection=int(Projection.RAY)) if seen.is_panoramic else None
+            return binding.accuracy.accuracy(library, structs.AccuracyLevel.FINAL,
+                                             projection=int(structs.Projection.RAY)) if seen.is_panoramic else None
         rows = effects.plan(library, scene, depsgraph.view_layer, depsgraph, None)
         return quality.accuracy_of(library, settings, rows, seen.is_panoramic)
 
@@ -236,12 +233,12 @@ class _Making:
 
     def is_running(self):
         if self._task is None:
-            if self._meshes.job.poll()[0] == JobState.RUNNING:
+            if self._meshes.job.poll()[0] == structs.JobState.RUNNING:
                 return True
             self._meshes.job.wait()
             self.surface = mattes.surface_of(self._meshes)
             self._task = self._begin(self.surface)
-        return self._task.job.poll()[0] == JobState.RUNNING
+        return self._task.job.poll()[0] == structs.JobState.RUNNING
 
     def wait(self):
         self._task.job.wait()
@@ -259,7 +256,7 @@ def _clipped(cloud, planes):
     """The cloud, with its grade where it has one, without what lies above planes of its own space."""
     plain = getattr(cloud, 'cloud', cloud)
     kept = cloud_edit.clipped(plain, planes)
-    return kept if plain is cloud else GradedCloud(kept, cloud.settings)
+    return kept if plain is cloud else binding.grade.GradedCloud(kept, cloud.settings)
 
 
 def _texture(pixels):

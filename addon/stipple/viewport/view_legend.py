@@ -6,13 +6,13 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from .. import version
+from .. import choices, version
 from ..scene import overlays
 
 # Pixels at a user interface scale of 1.
 WIDTH, BAR, EDGE, TEXT = 220, 10, 18, 11
 STEPS = 64
-_TITLES = {kind: title for kind, title, _ in overlays.KINDS}
+_TITLES = {kind: title for kind, title, _ in choices.OVERLAYS}
 _AXES = (("X", (1.0, 0.0, 0.0)), ("Y", (0.0, 1.0, 0.0)), ("Z", (0.0, 0.0, 1.0)), ("round", (0.0, 0.0, 0.0)))
 
 

@@ -9,27 +9,23 @@ there, and before the first one its single colour.
 
 import atexit
 import json
-import logging
 import os
-import shutil
-import subprocess
-import tempfile
 from pathlib import Path
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from .. import cycles_functions, late, log
 from ..scene.view import facts
-from .. import cycles_functions
+
+shutil, subprocess, tempfile = (late.module(name) for name in ('shutil', 'subprocess', 'tempfile'))
 
 SCRIPT = Path(__file__).with_name('paint_worlds.py')
 # Pixels around and samples of each picture that is painted of a world, one after the other. 4096 are as many as a
 # common environment image has; they take 101 MB.
 STEPS = ((1024, 1), (4096, 4))
 POLL_SECONDS = 0.05
-
-log = logging.getLogger('stipple')
 
 
 class Picture:

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
-from ...binding.structs import MeshAlignment, MeshDensity, PictureDrawing
+from ...binding import structs
 from .mesh_adapt import DENSITIES, TargetedOperator
 
 _ALIGNMENTS = (('NONE', "None", "The mesh lies where the images show the object"),
@@ -36,8 +36,9 @@ class AdaptToViewsOperator(TargetedOperator):
         return self.run_in_window(context)
 
     def _start_by_views(self, views):
-        return self._start(views, density=MeshDensity[self.density], alignment=MeshAlignment[self.alignment],
-                           picture_side=self.image_size, picture_drawing=PictureDrawing[self.drawing])
+        return self._start(views, density=structs.MeshDensity[self.density],
+                           alignment=structs.MeshAlignment[self.alignment],
+                           picture_side=self.image_size, picture_drawing=structs.PictureDrawing[self.drawing])
 
     def _say_difference(self, images, report):
         """images: what the mesh was compared with, in words."""

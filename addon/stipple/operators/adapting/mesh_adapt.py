@@ -6,15 +6,16 @@ import time
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...binding.errors import StippleError, invalid
-from ...binding.mesh import Mesh
-from ...binding.mesh_adapt import adapt_report, start_adapt
-from ...binding.structs import MeshAlignment, MeshDensity
+from ... import binding
+from ...binding import structs
+from ...binding.errors import invalid
 from ...jobs import JobOperator
 from ...scene import adapting
 from ...scene.source import splat_data
 
 _PREVIEW_SECONDS = 0.5
+RESULTS = (('SHAPE_KEY', "Shape Key", "The new shape is a shape key of the mesh, at a value of 1. The other shape keys "
+            "go to 0"), ('APPLY', "Apply", "The vertices of the mesh move; its old shape is not kept"))
 DENSITIES = (('ADAPTIVE', "Adaptive", "Vertices are drawn to where the shape is complex"),
               ('UNIFORM', "Uniform", "All edges become about as long as each other"),
               ('OFF', "Off", "Vertices go wherever the target pulls them"))
@@ -33,7 +34,7 @@ class AdaptOperator(JobOperator):
     from_mix = False  # whether shape keys count as they are mixed
     _shown_at = 0.0
 
-    result: EnumProperty(name="Result", description="Where the new shape goes", items=adapting.RESULTS)
+    result: EnumProperty(name="Result", description="Where the new shape goes", items=RESULTS)
     preview: BoolProperty(name="Preview", description="Show the mesh on its way", default=True)
 
     @classmethod
@@ -65,8 +66,8 @@ class AdaptOperator(JobOperator):
         self._shown.take_back()
 
     def finish(self, context, job):
-        self._shown.write(self._template.local(Mesh.of_job(job)))
-        self._tell(context, adapt_report(job))
+        self._shown.write(self._template.local(binding.mesh.Mesh.of_job(job)))
+        self._tell(context, binding.mesh_adapt.adapt_report(job))
 
     def _begin(self, obj, key_name):
         self._template = adapting.template_of(obj, self.result, self.from_mix)
@@ -112,9 +113,9 @@ class TargetedOperator(AdaptOperator):
     seed: IntProperty(name="Seed", description="Another seed measures the surface at other points", default=0, min=0)
 
     def _start(self, target, landmarks=(), **settings):
-        return start_adapt(self._template.native(), target, landmarks, strength=self.strength,
-                           smoothness=self.smoothness, steps=self.steps, target_count=self.points, seed=self.seed,
-                           **settings)
+        return binding.mesh_adapt.start_adapt(self._template.native(), target, landmarks, strength=self.strength,
+                                              smoothness=self.smoothness, steps=self.steps,
+                                              target_count=self.points, seed=self.seed, **settings)
 
 
 class STIPPLE_OT_mesh_adapt(TargetedOperator, bpy.types.Operator):
@@ -144,8 +145,8 @@ class STIPPLE_OT_mesh_adapt(TargetedOperator, bpy.types.Operator):
         self._target_name = target.name
         self._begin(obj, f'Adapted to {target.name}')
         return self._start(adapting.target_of(target, context.evaluated_depsgraph_get()),
-                           adapting.landmarks_of(obj, self.landmarks), density=MeshDensity[self.density],
-                           alignment=MeshAlignment[self.alignment], symmetric_weight=self.symmetric)
+                           adapting.landmarks_of(obj, self.landmarks), density=structs.MeshDensity[self.density],
+                           alignment=structs.MeshAlignment[self.alignment], symmetric_weight=self.symmetric)
 
     def draw(self, _context):
         self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'points', 'alignment', 'landmarks',

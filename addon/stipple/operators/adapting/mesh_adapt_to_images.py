@@ -9,7 +9,7 @@ import numpy as np
 from bpy.props import EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...binding.views import Views
+from ... import binding
 from ...scene.sequence import frames
 from ...scene.source import sources
 from ...scene.view import photo_cameras
@@ -35,7 +35,7 @@ class STIPPLE_OT_mesh_adapt_to_images(AdaptToViewsOperator, bpy.types.Operator, 
 
     def start(self, context):
         path = bpy.path.abspath(self.filepath)
-        views = Views.open(sources.context(), path)
+        views = binding.views.Views.open(sources.context(), path)
         self._images_name = os.path.basename(os.path.normpath(path if os.path.isdir(path) else os.path.dirname(path)))
         self._begin(context.view_layer.objects.active, f'Adapted to {self._images_name}')
         to_images = np.linalg.inv(frames.to_world(photo_cameras.chosen_frame(path, self.up_axis)))

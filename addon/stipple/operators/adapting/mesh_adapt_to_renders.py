@@ -7,8 +7,7 @@ from bpy.props import IntProperty
 from ...cycles_functions import CyclesRender
 from ...jobs import ViewsFirst
 from ...scene import adapting
-from ...scene.fit.adapting_to_views import AdaptToViewsTask
-from ...scene.fit.view_task import RigSettings
+from ...scene.fit import adapting_to_views, view_task
 from .adapting_to_views import AdaptToViewsOperator
 from .mesh_adapt import other_objects, require_own_mesh
 
@@ -56,8 +55,8 @@ class STIPPLE_OT_mesh_adapt_to_renders(ViewsFirst, AdaptToViewsOperator, bpy.typ
         self._begin(obj, f'Adapted to {sources[0].name if is_one else "Renders"}')
         if self.alignment == 'NONE':
             adapting.require_nearness(self._template, sources, context.evaluated_depsgraph_get())
-        rig = RigSettings(self.view_count, self.image_size, self.samples, self.seed)
-        return AdaptToViewsTask(context, sources, rig, self._start_by_views)
+        rig = view_task.RigSettings(self.view_count, self.image_size, self.samples, self.seed)
+        return adapting_to_views.AdaptToViewsTask(context, sources, rig, self._start_by_views)
 
     def finish(self, context, job):
         super().finish(context, job.result)

@@ -6,8 +6,8 @@ import math
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
-from ...binding.mesh_adapt import start_adapt
-from ...binding.structs import MeshAlignment, MeshDensity
+from ... import binding
+from ...binding import structs
 from .mesh_adapt import AdaptOperator, length_text
 
 _DENSITIES = (('UNIFORM', "Uniform", "All edges become about as long as each other"),
@@ -34,9 +34,10 @@ class STIPPLE_OT_mesh_even_out(AdaptOperator, bpy.types.Operator):
     def start(self, context):
         self._begin(context.view_layer.objects.active, 'Evened Out')
         mesh = self._template.native()
-        return start_adapt(mesh, mesh, density=MeshDensity[self.density], alignment=MeshAlignment.NONE,
-                           steps=self.steps, lands_on_target=1,
-                           sharp_angle=min(self.sharp_angle, math.pi))  # float32 rounds 180° up
+        return binding.mesh_adapt.start_adapt(mesh, mesh, density=structs.MeshDensity[self.density],
+                                              alignment=structs.MeshAlignment.NONE, steps=self.steps, lands_on_target=1,
+                                              # float32 rounds 180° up
+                                              sharp_angle=min(self.sharp_angle, math.pi))
 
     def draw(self, _context):
         self._draw(('result', 'density', 'steps', 'sharp_angle', 'preview'))

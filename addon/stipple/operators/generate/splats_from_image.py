@@ -7,7 +7,7 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...binding.image import Image
+from ... import binding
 from ...scene.generate import image_task
 from ...scene.source import sources
 from .generating import GenerateAtCursor
@@ -34,8 +34,8 @@ class STIPPLE_OT_splats_from_image(GenerateAtCursor, bpy.types.Operator, ImportH
         native = sources.context()
         path = bpy.path.abspath(self.filepath)
         mask_path = bpy.path.abspath(self.mask) if self.mask else ''
-        image = Image.load(native, path)
-        mask = Image.load(native, mask_path) if mask_path else None
+        image = binding.image.Image.load(native, path)
+        mask = binding.image.Image.load(native, mask_path) if mask_path else None
         identity = b''.join(_identity(one) for one in (path, mask_path) if one)
         self._location = tuple(context.scene.cursor.location)
         return image_task.ImageTask(image, mask, identity, settings, self.seed_count, self.anchors)

@@ -6,9 +6,9 @@ import hashlib
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
+from ... import binding
+from ...binding import structs
 from ...binding.errors import invalid
-from ...binding.image import Image
-from ...binding.structs import Transfer
 from ...scene.generate import image_task, placing, selection_view
 from ...scene.source import sources
 from .generating import GenerateOperator
@@ -64,7 +64,7 @@ class STIPPLE_OT_splats_from_render(GenerateOperator, bpy.types.Operator):
             raise invalid('The scene has no camera; add one, or choose the view Front.')
         seen = selection_view.render(context, self._objects, self.engine, int(self.canvas), self.samples, camera)
         self._bounds, self._viewer = seen.bounds, seen.viewer
-        image = Image.create(sources.context(), seen.linear, Transfer.LINEAR)
+        image = binding.image.Image.create(sources.context(), seen.linear, structs.Transfer.LINEAR)
         identity = hashlib.sha256(seen.linear.tobytes()).digest()
         settings = self._settings(placing.largest_side(seen.bounds))
         return image_task.ImageTask(image, None, identity, settings, self.seed_count, self.anchors)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...binding.structs import WeightsState
+from ...binding import structs
 from ...jobs import JobOperator
 from ...scene.generate import weights_table
 
@@ -31,7 +31,8 @@ class STIPPLE_OT_weights_check(JobOperator, bpy.types.Operator):
     def finish(self, _context, job):
         weights_table.keep_checked(job)
         found = [row for row in weights_table.rows() if row['path']]
-        others = [row['label'] for row in found if row['state'] not in (WeightsState.PUBLISHED, WeightsState.TRAINED, WeightsState.NOT_NEEDED)]
+        known = (structs.WeightsState.PUBLISHED, structs.WeightsState.TRAINED, structs.WeightsState.NOT_NEEDED)
+        others = [row['label'] for row in found if row['state'] not in known]
         if others:
             self.report({'WARNING'}, f"Not the published files: {', '.join(others)}")
         else:

@@ -5,9 +5,9 @@ import bpy
 import numpy as np
 from bpy.props import FloatProperty, IntProperty
 
+from ... import binding
 from ...binding import cloud_edit, regions
 from ...binding.errors import invalid
-from ...binding.model import Model
 from ...jobs import JobOperator, Task
 from ...scene.source import edits, selecting, source_paths, source_settings, sources
 from .stroke import redraw
@@ -72,8 +72,8 @@ class STIPPLE_OT_fill_erased(JobOperator, bpy.types.Operator):
                                  ground.whole.info().frame)
         mask = np.concatenate([ground.stays[ground.rest != 0], np.ones(new.info().count, np.uint8)])
         if tree_path is not None:
-            model = Model.of_job(task.run(Model.from_cloud_start(native, whole), start, end))
-            tree = sources.save_model(model, tree_path)
+            made = task.run(binding.model.Model.from_cloud_start(native, whole), start, end)
+            tree = sources.save_model(binding.model.Model.of_job(made), tree_path)
         return fill.report, whole, tree, mask
 
     def finish(self, context, job):

@@ -4,11 +4,11 @@
 import bpy
 from bpy.props import EnumProperty
 
-from ...binding.regions import RegionOperation
+from ... import binding
 from ...scene.source import selecting
 from .stroke import SelectOperator
 
-_OPERATIONS = {'SELECT': RegionOperation.SET, 'DESELECT': RegionOperation.SUBTRACT, 'INVERT': RegionOperation.TOGGLE}
+_OPERATIONS = {'SELECT': 'SET', 'DESELECT': 'SUBTRACT', 'INVERT': 'TOGGLE'}
 
 
 class STIPPLE_OT_select_all(SelectOperator, bpy.types.Operator):
@@ -23,7 +23,7 @@ class STIPPLE_OT_select_all(SelectOperator, bpy.types.Operator):
                                 ('INVERT', "Invert", "Select what is not selected now")))
 
     def regions_of(self, _obj):
-        return selecting.everything(_OPERATIONS[self.action])
+        return selecting.everything(binding.regions.RegionOperation[_OPERATIONS[self.action]])
 
 
 classes = (STIPPLE_OT_select_all,)

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from bpy.props import FloatProperty
 
-from ...binding.regions import Region, RegionKind
+from ...binding import regions
 from ...scene.source import placement
 from .stroke import SelectOperator
 
@@ -22,7 +22,7 @@ class _Neighbours(SelectOperator):
     def regions_of(self, obj):
         # The mean of the object's scales; regions are in its own space.
         scale = abs(np.linalg.det(placement.matrix_of(obj)[:3, :3])) ** (1 / 3)
-        return [Region(RegionKind.GROW, distance=self.distance / scale, shrink=self.shrinks)]
+        return [regions.Region(regions.RegionKind.GROW, distance=self.distance / scale, shrink=self.shrinks)]
 
 
 class STIPPLE_OT_select_grow(_Neighbours, bpy.types.Operator):

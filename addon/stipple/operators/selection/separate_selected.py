@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...binding.model import Model
+from ... import binding
 from ...jobs import JobOperator, Task
 from ...scene.source import edits, selecting, source_paths, source_settings, sources
 from .stroke import redraw
@@ -41,9 +41,9 @@ class STIPPLE_OT_separate_selected(JobOperator, bpy.types.Operator):
                     part = moving()
                     tree, settings = sources.save_model(part, path), part.settings()
                 elif has_budget:
-                    job = task.run(Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted),
+                    job = task.run(binding.model.Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted),
                                    (i + 1) / len(wanted))
-                    tree = sources.save_model(Model.of_job(job), path)
+                    tree = sources.save_model(binding.model.Model.of_job(job), path)
                 made.append((cloud, tree, settings))
             return made
         return Task(work)

@@ -8,14 +8,13 @@ same properties and execute at once, in background too.
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatVectorProperty, IntVectorProperty
 
+from ... import binding
 from ...binding.errors import StippleError, invalid
-from ...binding.regions import RegionOperation
 from ...jobs import JobOperator
 from ...scene import selection_settings
 from ...scene.source import edits, selecting
 from ...scene.view import cameras, drawn_regions, picking
-from ...viewport import selected_points
-from ...viewport.stroke_marks import StrokeMarks
+from ...viewport import selected_points, stroke_marks
 from .stroke_preview import StrokePreview
 
 _KEYS_OF_RADIUS = {'WHEELUPMOUSE': 1.1, 'WHEELDOWNMOUSE': 1 / 1.1, 'RIGHT_BRACKET': 1.1, 'LEFT_BRACKET': 1 / 1.1}
@@ -45,7 +44,7 @@ class OperationOperator(SelectOperator):
                             items=selection_settings.OPERATIONS)
 
     def chosen_operation(self):
-        return RegionOperation[self.operation]
+        return binding.regions.RegionOperation[self.operation]
 
     def take_operation(self, context, event):
         if self.properties.is_property_set('operation'):
@@ -78,7 +77,7 @@ class DrawnOperator(OperationOperator):
             return {'PASS_THROUGH'}
         self._region, self._region_data = (None, None) if view is None else view[:2]
         self.take_settings(context)
-        self._marks = StrokeMarks(self.shape, self.mark_radius(context))
+        self._marks = stroke_marks.StrokeMarks(self.shape, self.mark_radius(context))
         if event.type == 'LEFTMOUSE' and event.value in {'PRESS', 'CLICK_DRAG'}:
             if not self._press(context, event):
                 self._leave(context)

@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
+from ... import binding
 from ...binding import regions
-from ...binding.cloud import Cloud, SplatArrays
 from ...binding.errors import StippleError
 from ...scene.source import edits, selecting, selections, sources
 
@@ -63,7 +63,7 @@ def _places(positions):
     count = len(positions)
     rotations = np.zeros((count, 4), np.float32)
     rotations[:, 0] = 1.0
-    return Cloud.create(sources.context(), SplatArrays(
+    return binding.cloud.Cloud.create(sources.context(), binding.cloud.SplatArrays(
         positions, rotations, np.ones((count, 3), np.float32), np.ones(count, np.float32),
         np.zeros((count, 1, 3), np.float32)))
 

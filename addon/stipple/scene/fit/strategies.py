@@ -4,21 +4,24 @@
 from functools import lru_cache
 from zlib import crc32
 
-from ...binding import strategies as native
+from ... import binding
+from ...binding import strategies as native, structs
 from ...binding.errors import LibraryError, StippleError
-from ...binding.fit import fit_options
-from ...binding.structs import FitModel, FitQuality
 from ..source import sources
 
 ADAPTIVE, TEMPORAL = 'adaptive', 'temporal'
 # As the preset of the quality has it; the number is that of the item in files.
 BY_QUALITY, BY_QUALITY_NUMBER = 'by_quality', 1
-_ADAPTIVE_ALONE = (native.StrategyEntry(ADAPTIVE, "Adaptive", "", FitModel.EXPLICIT),)
+
+
+@lru_cache(maxsize=1)
+def _adaptive_alone():
+    return (native.StrategyEntry(ADAPTIVE, "Adaptive", "", structs.FitModel.EXPLICIT),)
 
 
 @lru_cache(maxsize=1)
 def _of(library):
-    return (tuple(entry for entry in native.strategies(library) if entry.model == FitModel.EXPLICIT),
+    return (tuple(entry for entry in native.strategies(library) if entry.model == structs.FitModel.EXPLICIT),
             tuple(native.strategy_parts(library)))
 
 
@@ -35,7 +38,7 @@ def _library():
 def _listed():
     """(strategies of splats, parts); without the library the one that a fit starts from."""
     library = _library()
-    return (_ADAPTIVE_ALONE, ()) if library is None else _of(library)
+    return (_adaptive_alone(), ()) if library is None else _of(library)
 
 
 @lru_cache(maxsize=2)  # Blender keeps no reference to the texts of items
@@ -66,8 +69,8 @@ def chosen(settings):
     library = _library()
     if library is None:
         return ADAPTIVE
-    model = FitModel.MOTION if settings.model == 'MOTION' else FitModel.EXPLICIT
-    strategy = fit_options(library, model, FitQuality[settings.quality]).strategy_utf8
+    model = structs.FitModel.MOTION if settings.model == 'MOTION' else structs.FitModel.EXPLICIT
+    strategy = binding.fit.fit_options(library, model, structs.FitQuality[settings.quality]).strategy_utf8
     return TEMPORAL if strategy is None else strategy.decode()
 
 

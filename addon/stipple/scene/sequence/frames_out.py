@@ -17,10 +17,6 @@ from . import sequences
 from ..source import bound, placement, source_settings, sources, splat_data, sync
 from ..source.decoded import Carried, Decoder
 
-FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
-          ('SERIES', "Whole Series",
-           "Each file of the active object's series once, all objects placed as they are now"),
-          ('SCENE', "Scene Range", "Each frame of the scene's range: timing, budgets and motion as animated"))
 
 
 @dataclass
@@ -56,9 +52,9 @@ class FrameOut:
 
 
 def gather(context, objects, frames, budget, apply_grade=True):
-    """[FrameOut] of splat objects, the active one first; frames: a key of FRAMES but 'CURRENT'; budget: 'VIEWPORT',
-    'RENDER' or 'FULL'; apply_grade: with the objects' grades. Reads no file. Errors: StippleError for a gap in a
-    series."""
+    """[FrameOut] of splat objects, the active one first; frames: a key of choices.FRAMES_OUT but 'CURRENT'; budget:
+    'VIEWPORT', 'RENDER' or 'FULL'; apply_grade: with the objects' grades. Reads no file. Errors: StippleError for a gap
+    in a series."""
     if frames == 'SCENE':
         return _of_scene(context, objects, budget, apply_grade)
     data = objects[0].data

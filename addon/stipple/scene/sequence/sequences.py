@@ -21,14 +21,6 @@ from ...binding.structs import JobState, Status
 from . import numbered
 from ..source import masks, source_paths, source_settings, sources
 
-# As Blender's own volume sequences name them.
-MODES = (('CLIP', "Clip", "Nothing before the first and after the last file"),
-         ('EXTEND', "Extend", "The first file before the start, the last one after the end"),
-         ('REPEAT', "Repeat", "From the first file again after the last one"),
-         ('PING_PONG', "Ping-Pong", "The files play forward and backward alternately"))
-GAPS = (('ERROR', "Stop", "A missing file is an error: the panel says so, and a render fails"),
-        ('HOLD', "Hold Previous", "In place of a missing file, the one before it is shown"))
-
 _entries = OrderedDict()  # (path, time, size, of models) → _Entry, the one used last at the end
 _played = {}              # full name of a datablock → (frame shown last, direction of play)
 

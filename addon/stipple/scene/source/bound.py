@@ -22,10 +22,6 @@ from . import source_paths, sources
 
 # On objects: it has no influence, but Blender evaluates its target for it, hidden meshes too.
 CONSTRAINT = 'Splat Binding'
-REACHES = (('SURFACE', "Surface", "Each splat follows the nearest triangle: for splats that were made from the mesh or "
-                                  "lie on it"),
-           ('AROUND', "Around", "Each splat follows the triangles around it, smoothly: for scans and fits near a mesh "
-                                "or inside a cage"))
 _KEPT = 8  # bindings that are kept
 # Of modifiers: what renders evaluate and what the viewport does.
 _MODES = (('show_render', 'show_viewport'), ('render_levels', 'levels'))
@@ -71,8 +67,8 @@ def bind(data, obj, reach, matrix, depsgraph, brought=None):
 
 
 def brought_rest(data):
-    """(vertices [V,3] in the space of the splats, triangles [T,3], a name of REACHES) of the mesh that the file of a
-    datablock's splats brings, else None. Errors: StippleError."""
+    """(vertices [V,3] in the space of the splats, triangles [T,3], a name of choices.REACHES) of the mesh that the file
+    of a datablock's splats brings, else None. Errors: StippleError."""
     path = source_paths.file_of(data)
     if not path.endswith('.safetensors'):
         return None

@@ -7,9 +7,8 @@ import re
 import bpy
 import numpy as np
 
-from ...binding import cloud_edit
+from ...binding import cloud_edit, structs
 from ...binding.errors import StippleError, invalid
-from ...binding.structs import Status
 from .. import grades
 from ..sequence import frames, sequences
 from . import bound, decoded, formats, placement, source_settings, sources, splat_data, sync
@@ -75,7 +74,8 @@ def make_folder(path):
     except FileExistsError:
         pass
     except OSError as error:
-        raise StippleError(f"The folder '{folder}' cannot be made: {error.strerror}.", Status.ERROR_IO) from None
+        raise StippleError(f"The folder '{folder}' cannot be made: {error.strerror}.",
+                           structs.Status.ERROR_IO) from None
 
 
 def joined(placed):

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes become the model that splats are decoded from, or splats that were fitted to images of them."""
 
-from ...binding.cloud import Cloud
-from ...binding.model import DecodeSettings, Model, refine_start
-from ...binding.structs import AnchorOrder
+from ... import binding
+from ...binding import structs
 from ...jobs import Task
 from . import masks, source_settings, sources
 
@@ -15,27 +14,28 @@ REFINE_TEXT = ("Fit the splats to images of the meshes: edges and textures get s
 def start(native, mesh, settings, detail_weight, refine):
     """A job that makes the model, for model_of(). settings: DecodeSettings with the seed; a refined model is a tree of
     the splats that they give."""
-    making = Model.from_mesh_start(native, mesh, detail_weight, settings.seed)
+    making = binding.model.Model.from_mesh_start(native, mesh, detail_weight, settings.seed)
     if not refine:
         return making
 
     def work(task):
-        model = Model.of_job(task.run(making, 0.0, 0.1))
-        splats = Cloud.of_job(task.run(model.decode_start(settings), 0.1, 0.15))
-        refined = Cloud.of_job(task.run(refine_start(splats, mesh, REFINE_STEPS), 0.15, 0.85))
-        return Model.of_job(task.run(Model.from_cloud_start(native, refined), 0.85, 1.0))
+        model = binding.model.Model.of_job(task.run(making, 0.0, 0.1))
+        splats = binding.cloud.Cloud.of_job(task.run(model.decode_start(settings), 0.1, 0.15))
+        refining = task.run(binding.model.refine_start(splats, mesh, REFINE_STEPS), 0.15, 0.85)
+        refined = binding.cloud.Cloud.of_job(refining)
+        return binding.model.Model.of_job(task.run(binding.model.Model.from_cloud_start(native, refined), 0.85, 1.0))
     return Task(work)
 
 
 def model_of(job):
-    return job.result if isinstance(job, Task) else Model.of_job(job)
+    return job.result if isinstance(job, Task) else binding.model.Model.of_job(job)
 
 
 def made_with(stipple):
     """The settings that the present source was made with, where it is refined, or that show it."""
     known, gaussians = source_settings.of(stipple), stipple.gaussians_per_anchor
     anchors = max(1, stipple.source_count // gaussians) if known.counts_splats else stipple.anchors
-    return DecodeSettings(anchors, gaussians, AnchorOrder[stipple.order], stipple.seed)
+    return binding.model.DecodeSettings(anchors, gaussians, structs.AnchorOrder[stipple.order], stipple.seed)
 
 
 def show_all(stipple, made):

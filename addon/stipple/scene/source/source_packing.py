@@ -10,11 +10,10 @@ import os
 
 import bpy
 
-from ... import preferences
+from ... import log, preferences
+from ...binding import structs
 from ...binding.errors import StippleError
-from ...binding.structs import Status
 from . import source_files, source_paths
-from .source_paths import log
 
 _MAX_FILE_BYTES = 2**31 - 1  # of a packed file: Blender counts its bytes in 32 bits
 _SHARE_OF_MEMORY = 0.6       # as native work has it where the preferences name no limit
@@ -81,7 +80,8 @@ def _images(first, path, paths):
         for file in fresh:
             if file.packed_file is not None:
                 file.unpack(method='REMOVE')
-        raise StippleError(f"'{other}' cannot be packed: {str(error).strip().removeprefix('Error: ')}", Status.ERROR_IO) from None
+        raise StippleError(f"'{other}' cannot be packed: {str(error).strip().removeprefix('Error: ')}",
+                           structs.Status.ERROR_IO) from None
     return found
 
 
@@ -89,7 +89,7 @@ def _paths(path):
     files = source_files.of(path, True)
     if not source_paths.is_alone(path):
         raise StippleError(f"The series '{path}' has {len(files.names):,} files in several folders, which a .blend "
-                           'cannot hold; choose Collect Splat Sources instead.', Status.ERROR_UNSUPPORTED)
+                           'cannot hold; choose Collect Splat Sources instead.', structs.Status.ERROR_UNSUPPORTED)
     return [os.path.normpath(os.path.join(files.root, name)) for name in files.names]
 
 
@@ -105,7 +105,7 @@ def _require_room(path, paths):
         problem = f'together {sum(sizes) / _GIB:.1f} GiB, and the memory limit is {room / _GIB:.1f} GiB'
     if problem:
         raise StippleError(f"The series '{path}' has {len(paths):,} files, {problem}; choose Collect Splat Sources "
-                           'instead.', Status.ERROR_MEMORY_LIMIT)
+                           'instead.', structs.Status.ERROR_MEMORY_LIMIT)
 
 
 def _memory():

@@ -8,15 +8,15 @@ it out of lists. (A Volume would not do: Blender makes objects of Volumes that a
 same path as text, for scripts and for files without such an Image.
 """
 
-import logging
 import os
 import re
-import shutil
 
 import bpy
 
-from ... import preferences, version
+from ... import late, log, preferences, version
 from . import source_settings
+
+shutil = late.module('shutil')
 
 MODEL_SUFFIX = '.stipple.safetensors'
 FOLDER = 'stipple'  # beside the .blend
@@ -25,7 +25,6 @@ _LONGEST_NAME = 60
 # What Blender takes an Image for. It remaps the paths of both; a movie it does not pack.
 FILE, WHOLE = 'FILE', 'MOVIE'
 
-log = logging.getLogger('stipple')
 _unpacked = {}  # what tells a packed file from others → where it lies as a file
 
 

@@ -9,7 +9,7 @@ import json
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 
-from ...binding.structs import MAX_ANCHORS, BudgetUnit
+from ...binding import structs
 
 KINDS = (('NONE', "None", "The splats have no source"),
          ('MODEL', "Model", "The source decodes to splats at any budget"),
@@ -65,9 +65,10 @@ _TREE = SourceSettings(has_source=True, has_budget=True, counts_splats=True, has
 
 def of_model(settings):
     """In: settings, StippleModelSettings."""
-    counts_kept_anchors = settings.budget_unit == BudgetUnit.ANCHORS and settings.maximum_budget < MAX_ANCHORS
+    unit = settings.budget_unit
+    counts_kept_anchors = unit == structs.BudgetUnit.ANCHORS and settings.maximum_budget < structs.MAX_ANCHORS
     return SourceSettings(
-        True, True, settings.budget_unit == BudgetUnit.SPLATS, bool(settings.takes_mask), settings.default_budget,
+        True, True, unit == structs.BudgetUnit.SPLATS, bool(settings.takes_mask), settings.default_budget,
         settings.minimum_learned_budget, settings.maximum_learned_budget, settings.minimum_gaussians_per_anchor,
         settings.maximum_gaussians_per_anchor, settings.default_gaussians_per_anchor, bool(settings.has_order),
         bool(settings.has_seed), bool(settings.has_time), settings.time_begin, settings.time_end,

@@ -11,10 +11,10 @@ import os
 import bpy
 from bpy.app.handlers import persistent
 
+from ... import late, log
 from ...binding.errors import StippleError
 from .. import handlers
 from . import decoded, setting_paths, source_files, source_packing, source_paths, sources, splat_data, sync
-from .source_paths import log
 
 # told: whether this Blender tells the path before it saves. before: the path until then.
 # homes: folders where this file was in this session. changed: [(Image, its path before the save)].
@@ -62,9 +62,10 @@ def follow_texts():
 
 def say_missing():
     """Says each missing source once."""
-    if sources.library_problem():
-        return  # the panels say so, and more is missing than files
-    for data in source_paths.splat_datablocks():
+    found = list(source_paths.splat_datablocks())
+    if not found or sources.library_problem():
+        return  # the panels say what is wrong with the library, and more is missing than files
+    for data in found:
         path = source_paths.file_of(data)
         if (data.name_full, path) not in _said and sources.state(data) == 'MISSING':
             _said.add((data.name_full, path))
@@ -190,7 +191,8 @@ def _save_post_fail(*_):
 @persistent
 def _loaded(*_):
     source_paths.forget()
-    source_packing.forget()
+    if late.is_loaded(source_packing):
+        source_packing.forget()
     _said.clear()
     _state['homes'] = []
     _imported()

@@ -15,21 +15,20 @@ import bmesh
 import bpy
 import numpy as np
 
-from ... import version
-from ...binding.cloud import Cloud, SplatArrays, sh_degree_of
+from ... import binding, version
+from ...binding import structs
 from ...binding.errors import StippleError
-from ...binding.structs import Antialias, ColourSpace, Frame, SplatQuantity, Status
 
 LAYOUT_KEY = 'stipple_layout'
 LAYOUT = 1
 COLOUR_SPACE_KEY = 'stipple_colour_space'
 ANTIALIAS_KEY = 'stipple_antialias'
 FRAME_KEY = 'stipple_frame'
-_COLOUR_SPACES = {ColourSpace.DISPLAY: 'srgb_rec709_display', ColourSpace.LINEAR: 'lin_rec709_display'}
-_ANTIALIAS = {Antialias.CLASSIC: 'classic', Antialias.MIP: 'mip'}
-# Attributes of what density control saw.
-SEEN_NAMES = {SplatQuantity.SCORE: 'seen:score', SplatQuantity.AGE: 'seen:age',
-              SplatQuantity.CONTRIBUTION: 'seen:contribution'}
+# By names of the enumerations in binding/structs.py.
+_COLOUR_SPACES = {'DISPLAY': 'srgb_rec709_display', 'LINEAR': 'lin_rec709_display'}
+_ANTIALIAS = {'CLASSIC': 'classic', 'MIP': 'mip'}
+# Attributes of what density control saw, a SplatQuantity each.
+_SEEN_NAMES = {'SCORE': 'seen:score', 'AGE': 'seen:age', 'CONTRIBUTION': 'seen:contribution'}
 SEEN_SOURCE_KEY = 'stipple_seen_source'
 # Smallest scale that is stored, metres: viewers take logarithms, of which zero has none.
 MIN_SCALE = 1e-9
@@ -83,7 +82,7 @@ def bytes_each(data):
 
 def degree(data):
     """The degree of the harmonics that a datablock stores."""
-    return sh_degree_of(1 + sum(a.name.startswith('radiance:sh_') for a in data.attributes))
+    return binding.cloud.sh_degree_of(1 + sum(a.name.startswith('radiance:sh_') for a in data.attributes))
 
 
 def write(data, splats, ungraded=None):
@@ -91,7 +90,7 @@ def write(data, splats, ungraded=None):
     to be kept beside them."""
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         raise StippleError(f"'{data.name}' is in Edit Mode; leave it before its splats are written.",
-                           Status.ERROR_INVALID_ARGUMENT)
+                           structs.Status.ERROR_INVALID_ARGUMENT)
     if isinstance(data, bpy.types.Mesh) and not _is_editable(data):
         _write_linked(data, splats, ungraded)
         return
@@ -123,8 +122,12 @@ def _write_colours(data, prefix, splats):
             data.attributes.remove(data.attributes[name])
 
 
+def _seen_names():
+    return [(structs.SplatQuantity[kind], name) for kind, name in _SEEN_NAMES.items()]
+
+
 def _write_seen(data, seen):
-    for kind, name in SEEN_NAMES.items():
+    for kind, name in _seen_names():
         if kind in seen:
             _set(data, name, 'FLOAT', seen[kind])
         elif name in data.attributes:
@@ -133,7 +136,7 @@ def _write_seen(data, seen):
 
 def read_seen(data, kind):
     """[N] what density control saw of the splats of a datablock (SplatQuantity), None where it is not known."""
-    attribute = data.attributes.get(SEEN_NAMES[kind])
+    attribute = data.attributes.get(_SEEN_NAMES[kind.name])
     if attribute is None or attribute.data_type != 'FLOAT' or attribute.domain != 'POINT':
         return None
     return np.array(version.attribute_values(attribute.data, 'value', count(data), 1), np.float32)
@@ -142,7 +145,7 @@ def read_seen(data, kind):
 def keep_seen(data, source, seen):
     """Keeps what was seen of all splats of a source, for when its whole budget is shown again. As text: from Blender 4
     on, bytes end at the first zero."""
-    for kind, name in SEEN_NAMES.items():
+    for kind, name in _seen_names():
         if kind in seen:
             values = np.ascontiguousarray(seen[kind], np.float32).tobytes()
             data[f'stipple_{name}'] = base64.b64encode(zlib.compress(values, 1)).decode()
@@ -155,7 +158,7 @@ def kept_seen(data, source, count):
     """What keep_seen() kept of a source of `count` splats."""
     found = {}
     if data.get(SEEN_SOURCE_KEY) == source:
-        for kind, name in SEEN_NAMES.items():
+        for kind, name in _seen_names():
             packed = data.get(f'stipple_{name}')
             if packed is None:
                 continue
@@ -186,9 +189,9 @@ def _write_linked(mesh, splats, ungraded):
 
 def _mark(data, splats):
     data[LAYOUT_KEY] = LAYOUT
-    data[COLOUR_SPACE_KEY] = _COLOUR_SPACES[ColourSpace(splats.colour_space)]
-    data[ANTIALIAS_KEY] = _ANTIALIAS[Antialias(splats.antialias)]
-    data[FRAME_KEY] = Frame(splats.frame).name
+    data[COLOUR_SPACE_KEY] = _COLOUR_SPACES[structs.ColourSpace(splats.colour_space).name]
+    data[ANTIALIAS_KEY] = _ANTIALIAS[structs.Antialias(splats.antialias).name]
+    data[FRAME_KEY] = structs.Frame(splats.frame).name
     if isinstance(data, bpy.types.Mesh):
         data.update()
     data.update_tag()
@@ -229,19 +232,20 @@ def _read(data, original, prefix):
     sh[:, 0] = base[:, :3]
     for i, values in enumerate(rest):
         sh[:, i + 1] = values.reshape(n, 3)
-    return SplatArrays(columns['positions'].reshape(n, 3).copy(), columns['rotations'].reshape(n, 4).copy(),
-                       columns['scales'].reshape(n, 3).copy(), base[:, 3].copy(), sh,
-                       *_marks(data if original is None else original), _seen(data))
+    return binding.cloud.SplatArrays(
+        columns['positions'].reshape(n, 3).copy(), columns['rotations'].reshape(n, 4).copy(),
+        columns['scales'].reshape(n, 3).copy(), base[:, 3].copy(), sh,
+        *_marks(data if original is None else original), _seen(data))
 
 
 def _seen(data):
-    found = {kind: read_seen(data, kind) for kind in SEEN_NAMES}
+    found = {kind: read_seen(data, kind) for kind, _ in _seen_names()}
     return {kind: values for kind, values in found.items() if values is not None}
 
 
 def _cloud(native, data, original, prefix):
     _, columns, rest = _columns(data, prefix)
-    return Cloud.from_columns(native, columns, rest, *_marks(data if original is None else original))
+    return binding.cloud.Cloud.from_columns(native, columns, rest, *_marks(data if original is None else original))
 
 
 def _columns(data, prefix):
@@ -250,7 +254,7 @@ def _columns(data, prefix):
     n, rest = count(data), 0
     while data.attributes.get(f'{prefix}:sh_{rest}') is not None:
         rest += 1
-    sh_degree_of(rest + 1)
+    binding.cloud.sh_degree_of(rest + 1)
     columns = {'positions': _positions(data, n), 'rotations': _get(data, 'rotation', n, 4),
                'scales': _get(data, 'scale', n, 3), 'base': _get(data, f'{prefix}:base', n, 4)}
     return n, columns, [_get(data, f'{prefix}:sh_{i}', n, 3) for i in range(rest)]
@@ -258,9 +262,9 @@ def _columns(data, prefix):
 
 def _marks(data):
     """What SplatArrays has beside its arrays."""
-    return (_key_of(_COLOUR_SPACES, data.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
-            _key_of(_ANTIALIAS, data.get(ANTIALIAS_KEY), Antialias.CLASSIC),
-            Frame.__members__.get(data.get(FRAME_KEY), Frame.UNKNOWN))
+    return (structs.ColourSpace[_key_of(_COLOUR_SPACES, data.get(COLOUR_SPACE_KEY), 'DISPLAY')],
+            structs.Antialias[_key_of(_ANTIALIAS, data.get(ANTIALIAS_KEY), 'CLASSIC')],
+            structs.Frame.__members__.get(data.get(FRAME_KEY), structs.Frame.UNKNOWN))
 
 
 def read_points(data, step=1):
@@ -328,7 +332,7 @@ def _get(data, name, n, width):
     attribute = data.attributes.get(name)
     if attribute is None:
         raise StippleError(f"'{data.name}' has no attribute '{name}'; a splat object needs position, scale, rotation "
-                           'and radiance:base.', Status.ERROR_INVALID_ARGUMENT)
+                           'and radiance:base.', structs.Status.ERROR_INVALID_ARGUMENT)
     return version.attribute_values(attribute.data, version.ATTRIBUTE_FIELDS[attribute.data_type], n, width)
 
 

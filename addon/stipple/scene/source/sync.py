@@ -5,13 +5,13 @@ One function writes: sync(). It is called when a property changes, and by the ha
 property's update function is not called when the property is animated, undone or loaded.
 """
 
-import logging
 import sys
 import time
 
 import bpy
 from bpy.app.handlers import persistent
 
+from ... import late, log
 from ...binding.errors import CancelledError, StippleError
 from .. import grades, handlers, limits, meshes
 from ..sequence import sequences
@@ -28,7 +28,6 @@ REST_SECONDS = 0.25  # after which a slider rests
 POLL_SECONDS = 0.1   # between two looks at what is decoded beside Blender
 FEW = 1000           # fewer splats say nothing about the time that each takes
 
-log = logging.getLogger('stipple')
 # What is wrong with a datablock, by name, for the panel; empty while all is well.
 problems = {}
 # limited: whether Max Splats counted when the viewport was evaluated last.
@@ -350,7 +349,8 @@ def _render_end(_scene, _=None):
 def _restored(*_):
     """After undo, redo and loading: splats that do not fit their settings are decoded again."""
     problems.clear()
-    limits.forget()
+    if late.is_loaded(limits):
+        limits.forget()
     _state['rendering'] = False
     _show_boxes(True)
     _follow_all()
@@ -358,8 +358,10 @@ def _restored(*_):
 
 @persistent
 def _load_pre(*_):
-    decoded.abandon()
-    decode_progress.forget()
+    if late.is_loaded(decoded):
+        decoded.abandon()
+    if late.is_loaded(decode_progress):
+        decode_progress.forget()
 
 
 @persistent
@@ -427,5 +429,6 @@ def unregister():
     if bpy.app.timers.is_registered(complete):
         bpy.app.timers.unregister(complete)
     problems.clear()
-    sequences.forget()
-    decoded.forget()
+    for module in (sequences, decoded, bound, sources):
+        if late.is_loaded(module):
+            module.forget()

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Collects assets, one after the other: what is there already stays, and what cannot be collected is left out."""
 
-import logging
 import os
 import time
 import zlib
 from dataclasses import asdict, dataclass, field
 
+from ... import log
 from ...binding.errors import CancelledError, StippleError, invalid
 from ...binding.structs import JobState, Status
 from ..source import sources
@@ -15,8 +15,6 @@ from .asset_folder import AssetFolder
 from .assets import LeftOutError
 from .point_colours import PointColours
 from .studio import Studio
-
-log = logging.getLogger('stipple')
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,6 @@ from ...binding import effects as native
 from ...binding.structs import CameraModel, Effect, EffectChoice, ObjectOrder
 from . import apertures, facts as facts_of, motion, quality
 
-CHOICES = (('AUTO', "Auto", "The effect is on where the image needs it"), ('ON', "On", "Always"),
-           ('OFF', "Off", "Never"))
 NAMES = {Effect.VIEW_COLOUR: "View-Dependent Color", Effect.MOTION: "Motion", Effect.MOTION_BLUR: "Motion Blur",
          Effect.DEPTH_OF_FIELD: "Depth of Field", Effect.EXACT_PROJECTION: "Exact Projection",
          Effect.ZOOM_ANTIALIASING: "Zoom Anti-Aliasing", Effect.TRANSPARENT_FILM: "Transparent Film",

@@ -7,9 +7,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ... import binding
+from ...binding import structs
 from ...binding.errors import StippleError
-from ...binding.structs import CameraModel, Frame
-from ...binding.views import Views
 from ..sequence import frames
 
 UP_AXES = (('AUTO', "From Format", "Z of transforms.json, -Y of COLMAP"), ('Z', "Z Up", "As in Blender"),
@@ -26,7 +26,7 @@ def frame_of(path):
     """Which way the axes of a data set's world point, by custom: that of transforms.json is Blender's, COLMAP's that of
     its first camera."""
     is_transforms = path.lower().endswith('.json') or any(os.path.isfile(os.path.join(path, n)) for n in _TRANSFORMS)
-    return frames.WORLD if is_transforms else Frame.RDF
+    return frames.WORLD if is_transforms else structs.Frame.RDF
 
 
 def chosen_frame(path, up_axis):
@@ -37,10 +37,10 @@ def chosen_frame(path, up_axis):
 def open_views(context, path):
     """(views, None), or, where images are missing, (cameras alone, the error)."""
     try:
-        return Views.open(context, path), None
+        return binding.views.Views.open(context, path), None
     except StippleError as error:
         try:
-            return Views.load(context, path), error
+            return binding.views.Views.load(context, path), error
         except StippleError:
             raise error from None
 
@@ -73,7 +73,7 @@ def set_optics(data, camera):
     cx, cy = (camera.cx, camera.cy) if camera.width else (0.5, 0.5)
     data.sensor_fit = 'HORIZONTAL'
     data.sensor_width = SENSOR_WIDTH
-    if camera.model == CameraModel.ORTHOGRAPHIC:
+    if camera.model == structs.CameraModel.ORTHOGRAPHIC:
         data.type = 'ORTHO'
         data.ortho_scale = width / camera.fx
     else:

@@ -3,8 +3,8 @@
 
 import numpy as np
 
+from ... import binding
 from ...binding.errors import StippleError, invalid
-from ...binding.renderer import EMPTY_DEPTH, Renderer
 from .. import instances
 from ..source import sources
 from . import cameras
@@ -16,7 +16,7 @@ _SOLID = 0.5  # opacity from which on something is there
 class PointOperator:
     """Mix-in for operators with `points` (flat coordinates), `point_count` and `use_points`: a click for each point.
 
-    `marks_of` is the class that shows the clicked points (viewport/picked_points.py). Called from a script, the points
+    marks_of(picked) gives what shows the clicked points (viewport/picked_points.py). Called from a script, the points
     are given and nothing is clicked.
     """
 
@@ -101,11 +101,11 @@ def point_at(depsgraph, region, region_data, x, y):
 def point_of_pixel(placed, camera, x, y):
     """The same for instances of instances.gather and a place in a camera's image, pixels from its top left."""
     _see_pixel(camera, x, y)
-    renderer = Renderer(sources.context())
+    renderer = binding.renderer.Renderer(sources.context())
     task = renderer.start(placed, camera, renderer.options(), median_depth=True)
     task.job.wait()
     depth = float(task.depth[0, 0])
-    if depth >= EMPTY_DEPTH:
+    if depth >= binding.renderer.EMPTY_DEPTH:
         raise _nothing_there()
     scale = depth if camera.model == 0 else 1.0
     seen = np.array([(0.5 - camera.cx) / camera.fx * scale, (0.5 - camera.cy) / camera.fy * scale, depth, 1.0])
@@ -116,7 +116,7 @@ def colour_of_pixel(placed, camera, x, y):
     """The linear colour [3] of instances at such a place, of their harmonics of degree 0 alone. Errors: StippleError
     where nothing solid is."""
     _see_pixel(camera, x, y)
-    renderer = Renderer(sources.context())
+    renderer = binding.renderer.Renderer(sources.context())
     options = renderer.options()
     options.sh_degree_limit = 0
     task = renderer.start(placed, camera, options, with_depth=False)

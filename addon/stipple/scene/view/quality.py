@@ -3,8 +3,7 @@
 
 import struct
 
-from ...binding import accuracy as native
-from ...binding.structs import AccuracyLevel, Effect, Precision, Projection, Sampling, SplatOrder
+from ...binding import accuracy as native, structs
 
 LEVELS = (('DRAFT', "Draft", "Draw a quarter of the splats with plain colors, for finding a view"),
           ('PREVIEW', "Preview", "Draw half of the splats, for experiments"),
@@ -22,8 +21,8 @@ SAMPLINGS = (('AS_TRAINED', "As Trained", "The low-pass that the splats were tra
              ('SAMPLES', "Samples", "Several samples for each pixel"))
 PRECISIONS = (('FLOAT', "Single", "Single precision, as splats are trained"),
               ('DOUBLE', "Double", "Double precision"))
-# Knobs that are enumerations, and what their values are called in the native library.
-_ENUMS = {'order': SplatOrder, 'projection': Projection, 'antialiasing': Sampling, 'precision': Precision}
+# Knobs that are enumerations, and what these are called in binding/structs.py.
+_ENUMS = {'order': 'SplatOrder', 'projection': 'Projection', 'antialiasing': 'Sampling', 'precision': 'Precision'}
 _NUMBERS = ('samples_per_side', 'sh_degree_limit', 'min_alpha', 'budget_share')
 KNOBS = tuple(_ENUMS) + _NUMBERS
 # Knobs that .blend files keep under another name.
@@ -44,32 +43,36 @@ def property_of(knob):
     return _PROPERTIES.get(knob, knob)
 
 
+def _enum(knob):
+    return getattr(structs, _ENUMS[knob])
+
+
 def accuracy_of(library, settings, rows=None, needs_rays=False):
     """StippleAccuracy of a column of settings. Errors: StippleError.
 
     rows: of an effects plan, which may ask for more. needs_rays: the camera sees along rays whatever the level is.
     """
-    level = AccuracyLevel[settings.level]
+    level = structs.AccuracyLevel[settings.level]
     made = native.accuracy(library, level)
-    knobs = {name: int(enum[getattr(settings, name)]) for name, enum in _ENUMS.items()}
+    knobs = {name: int(_enum(name)[getattr(settings, name)]) for name in _ENUMS}
     for name in _NUMBERS:
         # What rounds to the stored number is meant: Blender keeps single precision.
         value, exact = getattr(settings, property_of(name)), getattr(made, name)
         knobs[name] = exact if value == _single(exact) else value
-    if rows is not None and level != AccuracyLevel.REFERENCE:
+    if rows is not None and level != structs.AccuracyLevel.REFERENCE:
         knobs.update(_for_effects(knobs, rows, level))
     if needs_rays:
-        knobs['projection'] = int(Projection.RAY)
+        knobs['projection'] = int(structs.Projection.RAY)
     return native.accuracy(library, level, **knobs)
 
 
 def _for_effects(knobs, rows, level):
     """Knobs as the plan has them. What costs much is left to levels that ask for it, or to who chooses it."""
-    asked = {'sh_degree_limit': min(knobs['sh_degree_limit'], rows[Effect.VIEW_COLOUR].sh_degree)}
-    if rows[Effect.EXACT_PROJECTION].is_on and level >= AccuracyLevel.FINAL:
-        asked['projection'] = int(Projection.RAY)
-    if rows[Effect.ZOOM_ANTIALIASING].is_on and knobs['antialiasing'] == Sampling.AS_TRAINED:
-        asked['antialiasing'] = int(Sampling.MIP)
+    asked = {'sh_degree_limit': min(knobs['sh_degree_limit'], rows[structs.Effect.VIEW_COLOUR].sh_degree)}
+    if rows[structs.Effect.EXACT_PROJECTION].is_on and level >= structs.AccuracyLevel.FINAL:
+        asked['projection'] = int(structs.Projection.RAY)
+    if rows[structs.Effect.ZOOM_ANTIALIASING].is_on and knobs['antialiasing'] == structs.Sampling.AS_TRAINED:
+        asked['antialiasing'] = int(structs.Sampling.MIP)
     return asked
 
 
@@ -82,12 +85,12 @@ def knobs(library):
 
 def take_level(library, settings):
     """Sets every knob as the level of the settings has it. Errors: StippleError."""
-    _take(settings, native.accuracy(library, AccuracyLevel[settings.level]))
+    _take(settings, native.accuracy(library, structs.AccuracyLevel[settings.level]))
 
 
 def store(settings, accuracy):
     """Puts a StippleAccuracy into a column of settings."""
-    with_level = AccuracyLevel(accuracy.level).name
+    with_level = structs.AccuracyLevel(accuracy.level).name
     if settings.level != with_level:
         settings.level = with_level  # which sets the knobs; those that differ follow
     _take(settings, accuracy)
@@ -100,7 +103,7 @@ def is_same(one, other):
 
 def is_changed(library, settings):
     """Whether any knob differs from the level's. Errors: StippleError."""
-    made = native.accuracy(library, AccuracyLevel[settings.level])
+    made = native.accuracy(library, structs.AccuracyLevel[settings.level])
     return any(getattr(settings, property_of(name)) != value for name, value in _values(made))
 
 
@@ -116,8 +119,8 @@ def _take(settings, accuracy):
 
 
 def _values(accuracy):
-    for name, enum in _ENUMS.items():
-        yield name, enum(getattr(accuracy, name)).name
+    for name in _ENUMS:
+        yield name, _enum(name)(getattr(accuracy, name)).name
     for name in _NUMBERS:
         value = getattr(accuracy, name)
         yield name, _single(value)

@@ -5,11 +5,11 @@ import dataclasses
 
 from bpy.app.handlers import persistent
 
-from ...binding.structs import Effect
+from ...binding import structs
 from .. import handlers
 
 # Whose coming shows: Auto's degree of harmonics carries all but what nobody sees.
-KEPT = (Effect.EXACT_PROJECTION, Effect.ZOOM_ANTIALIASING)
+KEPT = ('EXACT_PROJECTION', 'ZOOM_ANTIALIASING')
 
 _since = {}  # {(scene, effect): the first frame that had it} of the animation that is being rendered
 
@@ -17,9 +17,10 @@ _since = {}  # {(scene, effect): the first frame that had it} of the animation t
 def kept(scene, rows):
     """The rows of a plan for the present frame of an animation, those on that an earlier frame of it has had."""
     rows = list(rows)
-    for effect in KEPT:
-        if getattr(scene.stipple, effect.name.lower()) != 'AUTO':
+    for name in KEPT:
+        if getattr(scene.stipple, name.lower()) != 'AUTO':
             continue
+        effect = structs.Effect[name]
         key = scene.name_full, effect
         if rows[effect].is_on:
             _since.setdefault(key, scene.frame_current)
