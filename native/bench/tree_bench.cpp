@@ -9,6 +9,7 @@
 #include "bench/splat_scene.h"
 #include "decode/tree/hierarchy_decoder.h"
 #include "decode/tree/merge_neighbours.h"
+#include "decode/tree/merge_rounds.h"
 
 namespace stipple::bench {
 
@@ -17,7 +18,6 @@ namespace {
 constexpr SplatCase k100k{"tree.100k", 100000, 0, 0, 0, 1.0};
 constexpr SplatCase k300k{"tree.300k", 300000, 0, 0, 0, 1.0};
 constexpr SplatCase k300kDegree3{"tree.300k.degree3", 300000, 0, 0, 3, 1.0};
-constexpr size_t kNeighbours = 8;  ///< as many as the tree begins with
 /// A slider that is dragged shows a cut within this time, on one thread.
 constexpr double kDragMilliseconds = 50;
 
@@ -28,7 +28,7 @@ void build(benchmark::State& state, const SplatCase& c) {
   compare(
       state, "neighbour_search",
       [&] { benchmark::DoNotOptimize(buildMergeTree(cloud, {}, {}).parents.data()); },
-      [&] { benchmark::DoNotOptimize(nearestNeighbours(places, kNeighbours).data()); });
+      [&] { benchmark::DoNotOptimize(nearestNeighbours(places, kMergeNeighbours).data()); });
 }
 
 /// 150,000 of 300,000 splats.
@@ -42,8 +42,7 @@ void cut(benchmark::State& state, const SplatCase& c) {
   const SplatCloud shown = decoder.decode(request);
   withThreads(1, [&] {
     compare(
-        state, "copy",
-        [&] { benchmark::DoNotOptimize(decoder.decode(request).positions.data()); },
+        state, "copy", [&] { benchmark::DoNotOptimize(decoder.decode(request).positions.data()); },
         [&] {
           const SplatCloud copy = shown;
           benchmark::DoNotOptimize(copy.positions.data());

@@ -19,7 +19,6 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kNeighbourCount = 6;
 /// Partners that are kept per node, the cheapest ones.
 constexpr size_t kListCapacity = 10;
 /// Neighbours are searched afresh when this many times fewer nodes are left.
@@ -110,21 +109,21 @@ class MergeRounds {
     std::vector<double> places(count * width);
     nodes_.places(active_, places.data());
     for (const uint32_t slot : active_) sizes_[slot] = 0;
-    const std::vector<uint32_t> rows = nearestNeighbours(places, kNeighbourCount, width);
+    const std::vector<uint32_t> rows = nearestNeighbours(places, kMergeNeighbours, width);
     const auto append = [&](uint32_t slot, uint32_t other) {
       if (sizes_[slot] == kListCapacity) return;
       entries_[slot * kListCapacity + sizes_[slot]++] = {0.0f, other};
     };
     std::vector<uint8_t> one_sided(count, 0);  // bit k: the neighbour k does not know the slot
-    static_assert(kNeighbourCount <= 8);
+    static_assert(kMergeNeighbours <= 8);
     parallelFor(count, kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        for (size_t k = 0; k < kNeighbourCount; ++k) {
-          const uint32_t other = rows[i * kNeighbourCount + k];
+        for (size_t k = 0; k < kMergeNeighbours; ++k) {
+          const uint32_t other = rows[i * kMergeNeighbours + k];
           if (other == kNoPlace) break;
           append(active_[i], active_[other]);
-          const uint32_t* back = &rows[other * kNeighbourCount];
-          const bool known = std::find(back, back + kNeighbourCount, i) != back + kNeighbourCount;
+          const uint32_t* back = &rows[other * kMergeNeighbours];
+          const bool known = std::find(back, back + kMergeNeighbours, i) != back + kMergeNeighbours;
           one_sided[i] = static_cast<uint8_t>(one_sided[i] | (known ? 0 : 1) << k);
         }
       }
@@ -136,7 +135,7 @@ class MergeRounds {
       one_sided[i] = 0;
       for (size_t k = 0; asking >> k != 0; ++k) {
         if (!(asking >> k & 1)) continue;
-        const uint32_t other = active_[rows[i * kNeighbourCount + k]];
+        const uint32_t other = active_[rows[i * kMergeNeighbours + k]];
         if (sizes_[other] < kListCapacity) {
           append(other, active_[i]);
         } else {

@@ -9,6 +9,9 @@
 
 namespace stipple {
 
+/// Of each node, when the tree begins and whenever partners are looked for afresh.
+constexpr size_t kMergeNeighbours = 6;
+
 /// One merge: the ids of both children (leaves 0..N-1 in the order of their nodes, then merges in
 /// the order in which they were made) and the error that it made.
 struct Merge {
