@@ -211,7 +211,7 @@ TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
   at_rest.run(observer, nullptr);
   const double moving = fit.trainer->history().by_budget.back().psnr;
   const double resting = at_rest.history().by_budget.back().psnr;
-  // 29.4 and 21.1 dB.
+  // 29.7 and 21.1 dB.
   EXPECT_GT(moving, resting + 6);
   // Every part was written once: all of the clip, two key frames, two windows, a pair.
   EXPECT_THAT(fit.store->names, ElementsAre("global", "key0.stage2", "key1.stage2", "key0.stage3",
@@ -225,7 +225,7 @@ TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
   EXPECT_EQ(source(0)->scaffold.coarsening, 0.5);
   const auto& budgets = fit.trainer->history().by_budget;
   ASSERT_EQ(budgets.size(), 3u);
-  EXPECT_GT(budgets[1].psnr, moving - 3) << "1.6 dB less";
+  EXPECT_GT(budgets[1].psnr, moving - 3.5) << "2.4 dB less";
 }
 
 TEST(RelayModel, EachStageStartsWhereTheLastEnded) {
