@@ -23,9 +23,9 @@ HERE = Path(__file__).resolve().parent
 ROOT_OF_ARM = Path('/usr/aarch64-linux-gnu')
 HEADER = test_windows.HEADER
 # Kernels of every instruction set add up in an order of their own, and NEON's fuse a product with its sum, as AVX2's do
-# and the plain ones do not. So the measure of what is seen, and what the tree over the splats mixes by it, differ by the
-# last bit. On x86-64 alone splats that are decoded by AVX2 and by AVX-512 differ by 6e-6, which is the logarithm that
-# stands for an opacity of almost one; NEON's differ from those of AVX-512 by 2e-6.
+# and the plain ones do not. So the measure of what is seen, and what the tree over the splats mixes by it, differ by
+# the last bit. On x86-64 alone splats that are decoded by AVX2 and by AVX-512 differ by 6e-6, which is the logarithm
+# that stands for an opacity of almost one; NEON's differ from those of AVX-512 by 2e-6.
 DECODED_ROUNDING = 1e-5
 # Numbers of the tree are at most one here, colours beyond it aside: two steps of float32.
 TREE_ROUNDING = 1.2e-7
