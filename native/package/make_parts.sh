@@ -66,12 +66,23 @@ own_build imath -DIMATH_INSTALL_PKG_CONFIG=OFF
 own_build openexr -DOPENEXR_BUILD_TOOLS=OFF -DOPENEXR_INSTALL_EXAMPLES=OFF -DOPENEXR_INSTALL_PKG_CONFIG=OFF \
   -DOPENEXR_INSTALL_TOOLS=OFF
 
-if [[ $kind == macos_* ]]; then
-  # What zig links into every program, for LLVM's linker: zig says where it keeps them.
-  echo 'int main() { throw 1; }' >"$parts/empty.cpp"
+if ((${#zig[@]})); then
+  # What zig links into every program: it says where it keeps it, unless it has linked the same before.
+  echo "int main() { throw $RANDOM$RANDOM; }" >"$parts/empty.cpp"
   linked=$(ZIG_VERBOSE_LINK=1 "$parts/bin/c++" -O2 "$parts/empty.cpp" -o "$parts/empty" 2>&1)
+fi
+linked_in() { # NAME
+  tr ' ' '\n' <<<"$linked" | grep "/$1\$" | tail -1
+}
+if [[ $kind == macos_* ]]; then
+  # For LLVM's linker.
   for name in libc++.a libc++abi.a libcompiler_rt.a; do
-    cp "$(tr ' ' '\n' <<<"$linked" | grep "/$name\$" | tail -1)" "$parts/lib/$name"
+    cp "$(linked_in $name)" "$parts/lib/$name"
   done
   cp "$folder/zig/lib/libc/darwin/libSystem.11.tbd" "$parts/lib/libSystem.tbd"
+elif [[ $kind == linux_arm64 ]]; then
+  # The compiler's own functions are one object, which brings exp, memcpy and some 80 more that the C library has, too,
+  # and which round otherwise. Here these have no names, so that those of the C library are called.
+  llvm-nm --defined-only "$(linked_in libcompiler_rt.a)" | awk '$2 == "W" && $3 !~ /^__/ { print $3 }' >"$parts/names"
+  llvm-objcopy --localize-symbols="$parts/names" "$(linked_in libcompiler_rt.a)" "$parts/lib/libcompiler_rt.a"
 fi

@@ -15,7 +15,8 @@ if(NOT APPLE)
   # stipple_package_link(TARGET): links a library or a program for the package.
   function(stipple_package_link TARGET)
     set_target_properties(${TARGET} PROPERTIES BUILD_WITH_INSTALL_RPATH ON)
-    target_link_libraries(${TARGET} PRIVATE $<TARGET_OBJECTS:stipple_settled_names>)
+    target_link_libraries(${TARGET} PRIVATE $<TARGET_OBJECTS:stipple_settled_names>
+      ${STIPPLE_PACKAGE_PARTS}/lib/libcompiler_rt.a)
     target_link_options(${TARGET} PRIVATE -Wl,--gc-sections -Wl,--build-id=none -Wl,-z,relro -Wl,-z,now -Wl,-s)
   endfunction()
   return()
