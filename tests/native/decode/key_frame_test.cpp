@@ -244,6 +244,17 @@ TEST(KeyFrame, ItsNetworkDoesNotMoveAllAnchorsAlike) {
   EXPECT_LT(farthest(), 1e-5f);
 }
 
+/// Of five anchors, away from the key frame's own moment.
+void expectSameSplats(const KeyFrame& frame, const KeyFrame& seen) {
+  KeyFrameTape tapes[2];
+  SplatCloud one, other;
+  splatsOfKeyFrame(frame, 5, -0.6, tapes[0], one);
+  splatsOfKeyFrame(seen, 5, -0.6, tapes[1], other);
+  EXPECT_EQ(one.positions, other.positions);
+  EXPECT_EQ(one.sh, other.sh);
+  EXPECT_EQ(one.scales, other.scales);
+}
+
 TEST(KeyFrame, ComesBackFromTensorsBitForBit) {
   for (const bool deforms : {false, true}) {
     const KeyFrame frame = someFrame(5, 4, deforms);
@@ -252,13 +263,7 @@ TEST(KeyFrame, ComesBackFromTensorsBitForBit) {
     const KeyFrame seen = keyFrameOfTensors(table, "key.7.", shape);
     EXPECT_EQ(seen.blend, frame.blend);
     EXPECT_EQ(seen.deformation.isThere(), deforms);
-    KeyFrameTape tapes[2];
-    SplatCloud one, other;
-    splatsOfKeyFrame(frame, 5, -0.6, tapes[0], one);
-    splatsOfKeyFrame(seen, 5, -0.6, tapes[1], other);
-    EXPECT_EQ(one.positions, other.positions);
-    EXPECT_EQ(one.sh, other.sh);
-    EXPECT_EQ(one.scales, other.scales);
+    expectSameSplats(frame, seen);
   }
 }
 
@@ -273,12 +278,7 @@ TEST(KeyFrame, DecodesFilesFromBeforeChangesGrewWithTheTime) {
   const KeyFrame seen = keyFrameOfTensors(table, "", shape);
   EXPECT_FALSE(seen.deformation.grows_from_key);
   frame.deformation.grows_from_key = false;
-  KeyFrameTape tapes[2];
-  SplatCloud one, other;
-  splatsOfKeyFrame(frame, 5, -0.6, tapes[0], one);
-  splatsOfKeyFrame(seen, 5, -0.6, tapes[1], other);
-  EXPECT_EQ(one.positions, other.positions);
-  EXPECT_EQ(one.sh, other.sh);
+  expectSameSplats(frame, seen);
 }
 
 TEST(KeyFrame, RefusesTensorsThatDoNotFitTogether) {
