@@ -41,6 +41,10 @@ struct Loss {
   }
   BackwardInput input(BackwardWants wants) const {
     BackwardInput input;
+    if (wants.mode == BackwardMode::kWeights) {
+      input.with_blending_weights = true;
+      return input;
+    }
     input.colour_gradient = gradient;
     if (wants.depth) input.depth_gradient = std::span(residual).first(residual.size() / 3);
     if (wants.mode == BackwardMode::kEdges) {
@@ -280,6 +284,16 @@ void edgesToGradients(benchmark::State& state, const SplatCase& c) {
       state, "without", [&] { goBack(edges, 2); }, [&] { goBack(plain, 2); });
 }
 
+/// What visibility asks for, over what a step of a fit does.
+void weightsToGradients(benchmark::State& state, const SplatCase& c) {
+  const Loss loss(c);
+  const BackwardInput plain = loss.input({BackwardMode::kGradients, false});
+  const BackwardInput weights = loss.input({BackwardMode::kWeights, false});
+  draw(c, 2);
+  compare(
+      state, "gradients", [&] { goBack(weights, 2); }, [&] { goBack(plain, 2); });
+}
+
 /// AVX2 over the best instruction set, the loop alone.
 void againstNarrow(benchmark::State& state, const SplatCase& c) {
   const Loss loss(c);
@@ -326,6 +340,7 @@ const bool registered = [] {
     add("splat.backward_statistics." + name, kRepeats, againstFloor, c,
         BackwardWants{BackwardMode::kStatistics, false});
     add("splat.backward_edges." + name, kRepeats, edgesToGradients, c);
+    add("splat.backward_weights." + name, kRepeats, weightsToGradients, c);
     add("splat.contributions_per_pair." + name, 2, contributionsPerPair, c);
     add("splat.backward_2_threads." + name, kRepeats, againstOneThread, c);
     add("splat.backward_avx2." + name, 1, againstNarrow, c);

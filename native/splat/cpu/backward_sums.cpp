@@ -11,9 +11,10 @@ namespace stipple {
 
 namespace {
 
-/// Whole cache lines.
+/// Whole cache lines; a single sum is no more than what it is.
 size_t strideOf(BackwardWants wants) {
   constexpr size_t kLine = 16;
+  if (backwardFieldCount(wants) == 1) return 1;
   return (backwardFieldCount(wants) + kLine - 1) / kLine * kLine;
 }
 
@@ -149,6 +150,8 @@ void BackwardSums::addFields(const VisibleSplats& visible, const TileGrid& grid,
 void BackwardSums::add(const VisibleSplats& visible, const TileGrid& grid,
                        const TileListMemory& lists, const TileSums& tiles) {
   switch (field_count_) {
+    case kWeightFieldCount:
+      return addFields<kWeightFieldCount>(visible, grid, lists, tiles);
     case kGradientFieldCount:
       return addFields<kGradientFieldCount>(visible, grid, lists, tiles);
     case kGradientFieldCount + 1:  // depth, or contributions: both are sums

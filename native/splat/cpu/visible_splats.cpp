@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <numbers>
 
 #include "base/parallel.h"
 #include "splat/cpu/tiles/tiled_render.h"
@@ -12,6 +13,7 @@ namespace stipple {
 namespace {
 
 constexpr size_t kGatherSplats = 8192;
+constexpr double kLargestWeight = 3.4e38;
 
 /// Checks and projects splats [begin, end) into slots from `begin` on. Returns how many are
 /// visible.
@@ -102,6 +104,22 @@ void visibleFlags(RenderWorkspace& drawn, std::vector<uint8_t>& flags) {
     for (size_t slot = begin; slot < end_slot; ++slot) flags[visible.extras[slot].index] = 1;
   };
   parallelFor(flags.size(), kRangeSplats, std::cref(write_range));
+}
+
+void unhiddenWeights(RenderWorkspace& drawn, std::vector<float>& weights) {
+  const VisibleSplats& visible = drawn.arrays().visible;
+  const SplatSlots slots = visible.slots();
+  weights.resize(drawn.arrays().scene.splat_count);
+  const auto write_range = [&](size_t begin, size_t end) {
+    std::fill(&weights[begin], &weights[begin] + (end - begin), 0.0f);
+    const size_t end_slot = begin + visible.slotCount(begin);
+    for (size_t slot = begin; slot < end_slot; ++slot) {
+      const Footprint<double> f = slots.footprint(static_cast<uint32_t>(slot));
+      const double weight = 2 * std::numbers::pi * f.opacity / (f.l00 * f.l11);
+      weights[slots.extras[slot].index] = static_cast<float>(std::min(weight, kLargestWeight));
+    }
+  };
+  parallelFor(weights.size(), kRangeSplats, std::cref(write_range));
 }
 
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {

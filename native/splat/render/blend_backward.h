@@ -8,8 +8,8 @@
 
 #include "splat/render/blend.h"
 
-// One pixel of splat/render/blend.h backwards, from its last splat to its first. With B the colour behind
-// a splat, the background included, and T the transmittance before it,
+// One pixel of splat/render/blend.h backwards, from its last splat to its first. With B the colour
+// behind a splat, the background included, and T the transmittance before it,
 //   dL/dalpha = T (c - B).dL/dC,   dL/dc = T alpha dL/dC,   B <- alpha c + (1 - alpha) B,
 // and without the splat the pixel would change by exactly dC = T alpha (c - B). B is a convex
 // combination, so no step loses digits. T is recovered by dividing by 1 - alpha >= 0.01.
@@ -25,6 +25,7 @@ enum class BackwardMode : uint32_t {
   kContributions = 1,  ///< and leave-one-out contributions
   kStatistics = 2,     ///< and every other statistic
   kEdges = 3,          ///< and edge weights alone, which many steps of a fit ask for; without depth
+  kWeights = 4,        ///< blending weights and no gradient
 };
 
 struct BackwardWants {
@@ -47,6 +48,8 @@ enum BackwardField : size_t {
   kFieldGreen,
   kFieldBlue,
   kGradientFieldCount,
+  kFieldWeightAlone = 0,
+  kWeightFieldCount,
   kFieldEdgeAlone = kGradientFieldCount,
   kEdgeFieldCount,
   kFieldContribution = kGradientFieldCount,
@@ -69,6 +72,7 @@ enum BackwardField : size_t {
 constexpr size_t fieldCountOf(BackwardMode mode) {
   return mode == BackwardMode::kGradients       ? kGradientFieldCount
          : mode == BackwardMode::kEdges         ? kEdgeFieldCount
+         : mode == BackwardMode::kWeights       ? kWeightFieldCount
          : mode == BackwardMode::kContributions ? kContributionFieldCount
                                                 : kStatisticsFieldCount;
 }
@@ -139,6 +143,10 @@ void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardWan
              PixelBackward<T>& pixel, T* sums) {
   pixel.transmittance /= T(1) - splat.alpha;
   const T weight = pixel.transmittance * splat.alpha;
+  if (wants.mode == BackwardMode::kWeights) {
+    sums[kFieldWeightAlone] += weight;
+    return;
+  }
   T own = loss.gradient[3];
   for (int c = 0; c < 3; ++c) own += splat.colour[c] * loss.gradient[c];
   if (wants.depth) {

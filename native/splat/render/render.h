@@ -44,9 +44,9 @@ enum class ObjectOrder : uint32_t {
   kApart = 1,
 };
 
-/// What something else drew, to stand at its depth between the splats: see splat/render/blend.h. The order
-/// is that of the splats' centres, as among the splats themselves, so a splat is before or behind
-/// as a whole. Row 0 is the top; the arrays are the caller's.
+/// What something else drew, to stand at its depth between the splats: see splat/render/blend.h.
+/// The order is that of the splats' centres, as among the splats themselves, so a splat is before
+/// or behind as a whole. Row 0 is the top; the arrays are the caller's.
 struct SurfaceLayer {
   uint32_t width = 0;  ///< pixels; those of the camera
   uint32_t height = 0;
@@ -135,6 +135,11 @@ class RenderWorkspace {
 /// Which splats passed culling in the picture that was drawn last into a workspace: those in view
 /// that are not too faint or too near. Out: flags [splats of all clouds] 0 or 1.
 void visibleFlags(RenderWorkspace& drawn, std::vector<uint8_t>& flags);
+
+/// Sum of alpha that each splat in view would have over the pixels of that picture with nothing in
+/// front: the integral of its projected Gaussian, clamps left out; the picture's borders cut
+/// nothing off. Out: weights [splats of all clouds]; 0 for the others.
+void unhiddenWeights(RenderWorkspace& drawn, std::vector<float>& weights);
 
 /// renderTiled into a result and a workspace that may have served before.
 void renderTiled(std::span<const SplatInstance> instances, const Camera& camera,

@@ -17,7 +17,8 @@ namespace stipple {
 /// used. Values must be finite and at most 1e4 in size.
 struct BackwardInput {
   /// [H,W,4] dL/d(premultiplied R, G, B, alpha) of RenderResult::colour. With a background the
-  /// alpha of the picture is constant, so its derivative counts for nothing.
+  /// alpha of the picture is constant, so its derivative counts for nothing. Empty: blending
+  /// weights are all that is wanted, and every array of derivatives stays empty.
   std::span<const float> colour_gradient;
   /// dL/d(coverage) of every pixel, coverage being 1 minus the transmittance behind its last splat:
   /// beside the derivative by alpha, and also where a background makes alpha constant.

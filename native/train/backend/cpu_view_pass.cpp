@@ -27,6 +27,7 @@ class CpuViewPass final : public ViewPass {
   void setLossGradient(std::span<const float> gradient) override;
   BackwardSummary backward(const StatisticRequest& request, double transmittance_weight = 0,
                            Progress* progress = nullptr) override;
+  ShownWeights shownWeights(Progress* progress = nullptr) override;
   std::span<const float> image() override;
   std::span<const float> statistic(Statistic statistic) override;
   void swapGradients(SplatCloud& gradients) override;
@@ -62,6 +63,7 @@ class CpuViewPass final : public ViewPass {
   BackwardWorkspace workspace_of_backward_;
   BackwardResult backward_;
   std::vector<uint8_t> visible_;  ///< [N]
+  std::vector<float> unhidden_;   ///< [N]
 };
 
 CpuViewPass::CpuViewPass() {
@@ -140,6 +142,17 @@ BackwardSummary CpuViewPass::backward(const StatisticRequest& request, double tr
   return {backward_.camera, backward_.background, backward_.visible_count, regularisation};
 }
 
+ShownWeights CpuViewPass::shownWeights(Progress* progress) {
+  requireStage(Stage::kDrawn, "weights need an image; call forward first");
+  stage_ = Stage::kDrawn;
+  BackwardInput input;
+  input.with_blending_weights = true;
+  renderBackward(workspace_, drawn_, input, workspace_of_backward_, backward_, UINT64_MAX,
+                 progress);
+  unhiddenWeights(workspace_, unhidden_);
+  return {gradients().blending_weights, unhidden_};
+}
+
 std::span<const float> CpuViewPass::image() {
   requireStage(Stage::kDrawn, "there is no image; call forward first");
   return drawn_.colour;
@@ -185,7 +198,8 @@ void CpuViewPass::lendStatistics(ViewStatistics& statistics) {
 
 uint64_t CpuViewPass::memoryBytes() const {
   uint64_t floats = drawn_.colour.capacity() + own_gradient_.capacity() + residual_.capacity() +
-                    made_errors_.capacity() + visible_.capacity() / sizeof(float);
+                    made_errors_.capacity() + visible_.capacity() / sizeof(float) +
+                    unhidden_.capacity();
   for (const SplatGradients& gradients : backward_.instances) {
     for (const GradientArray& array : kGradientArrays) {
       floats += (gradients.*array.values).capacity();

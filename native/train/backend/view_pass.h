@@ -29,6 +29,12 @@ struct BackwardSummary {
   double regularisation = 0;  ///< value of what adds to the loss beside the image
 };
 
+/// How much of each splat an image shows: [N] each, 0 for splats out of view.
+struct ShownWeights {
+  std::span<const float> seen;      ///< sum of T alpha over the pixels
+  std::span<const float> unhidden;  ///< unhiddenWeights: about that with nothing in front
+};
+
 /// What one view tells about splats: their image, its loss against a target, derivatives by the
 /// stored values, statistics and errors. Whoever looks at a view does it here, in a step of a fit
 /// or between steps, so that a strategy is told the same in both.
@@ -61,6 +67,9 @@ class ViewPass {
   /// transmittance. A request for structure errors, or for error maps, needs lossFor() it.
   virtual BackwardSummary backward(const StatisticRequest& request, double transmittance_weight = 0,
                                    Progress* progress = nullptr) = 0;
+
+  /// Of the image drawn last; instead of a loss and its derivatives, which are gone then.
+  virtual ShownWeights shownWeights(Progress* progress = nullptr) = 0;
 
   /// [H,W,4] drawn last.
   virtual std::span<const float> image() = 0;

@@ -19,7 +19,7 @@ using testing::pixelCount;
 using testing::randomCloud;
 using testing::randomWeights;
 
-enum class Wanted { kGradients, kContributions, kEverything };
+enum class Wanted { kWeights, kGradients, kContributions, kEverything };
 
 /// A scene of two clouds with pixels that end early, over a background.
 struct Scene {
@@ -34,6 +34,10 @@ struct Scene {
 
   BackwardInput input(Wanted wanted) const {
     BackwardInput made;
+    if (wanted == Wanted::kWeights) {
+      made.with_blending_weights = true;
+      return made;
+    }
     made.colour_gradient = gradient;
     if (wanted == Wanted::kGradients) return made;
     made.residual = residual;
@@ -58,7 +62,8 @@ struct Scene {
   std::vector<float> gradient, residual, weights;
 };
 
-constexpr Wanted kEveryMode[] = {Wanted::kGradients, Wanted::kContributions, Wanted::kEverything};
+constexpr Wanted kEveryMode[] = {Wanted::kWeights, Wanted::kGradients, Wanted::kContributions,
+                                 Wanted::kEverything};
 
 TEST(BackwardOutputs, AreTheSameBitsForAnyNumberOfThreads) {
   const Scene scene({.count = 5000, .degree = 2});

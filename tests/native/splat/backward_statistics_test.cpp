@@ -102,9 +102,9 @@ TEST(Contribution, IsTheErrorWithMinusTheErrorWithout) {
       const double expected =
           errorChange(picture, reference(without(cloud, {i}), camera, options), residual, weights);
       // About 500 pixels of three channels, each off by float32's rounding (6e-8) of a change below
-      // 0.1, and their float32 sum, which scalar kernels add pixel by pixel: 1e-5 and a millionth of
-      // the sum. 1.5e-5 is seen of 20. Where alpha is 0.99 the transmittance is found by a division
-      // that magnifies rounding a hundredfold; 7e-6 is seen.
+      // 0.1, and their float32 sum, which scalar kernels add pixel by pixel: 1e-5 and a millionth
+      // of the sum. 1.5e-5 is seen of 20. Where alpha is 0.99 the transmittance is found by a
+      // division that magnifies rounding a hundredfold; 7e-6 is seen.
       EXPECT_NEAR(static_cast<double>(result.instances[0].contributions[i]), expected,
                   (c.opacity > 0 ? 5e-5 : 1e-5) + 1e-6 * std::abs(expected))
           << i;
@@ -245,6 +245,62 @@ TEST(EdgeWeights, AreTheSameAloneAndBesideOthers) {
                 1e-5 * std::abs(static_cast<double>(beside.opacities[i])) + 1e-5);
   }
   EXPECT_GT(most, 1);
+}
+
+TEST(BlendingWeights, AreTheSameAloneAndBesideDerivatives) {
+  // Opaque splats too, so that some pixels are in doubt and are judged in double.
+  SplatCloud cloud = smallCloud(400, 1, 234);
+  for (size_t i = 0; i < cloud.size(); i += 3) cloud.opacities[i] = 1;
+  const Camera camera = frontCamera(83, 61, 60, 3);
+  const std::vector<float> gradient = randomWeights(pixelCount(camera) * 4, 18, -1, 1);
+  const SplatInstance instance{&cloud};
+  RenderOptions options;
+  options.with_background = true;
+  BackwardInput input;
+  input.with_blending_weights = true;
+  const SplatGradients alone = renderBackward({&instance, 1}, camera, options, input).instances[0];
+  EXPECT_TRUE(alone.positions.empty());
+  EXPECT_TRUE(alone.sh.empty());
+  input.colour_gradient = gradient;
+  const SplatGradients beside = renderBackward({&instance, 1}, camera, options, input).instances[0];
+  ASSERT_EQ(alone.blending_weights.size(), cloud.size());
+  double most = 0;
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    // Sums of the same terms in float32, of up to the pixels of a tile, in another order.
+    EXPECT_NEAR(alone.blending_weights[i], beside.blending_weights[i],
+                1e-5 * static_cast<double>(beside.blending_weights[i]) + 1e-7);
+    most = std::max(most, static_cast<double>(beside.blending_weights[i]));
+  }
+  EXPECT_GT(most, 1);
+}
+
+TEST(UnhiddenWeights, AreTheSumOfAlphaOfASplatThatStandsAlone) {
+  SplatCloud cloud = smallCloud(3, 0, 235);
+  // One in the middle of the image, one beyond its border, one behind the camera.
+  const float places[9] = {0, 0, 0, 50, 0, 0, 0, 0, -10};
+  std::copy(places, places + 9, cloud.positions.begin());
+  for (float& scale : cloud.scales) scale = 0.1f;
+  cloud.opacities.assign(3, 0.8f);
+  const Camera camera = frontCamera(83, 61, 60, 3);
+  const SplatInstance instance{&cloud};
+  RenderWorkspace workspace;
+  workspace.keepForBackward(true);
+  RenderResult picture;
+  renderTiled({&instance, 1}, camera, {}, workspace, picture);
+  std::vector<float> unhidden;
+  unhiddenWeights(workspace, unhidden);
+  BackwardInput input;
+  input.with_blending_weights = true;
+  BackwardWorkspace memory;
+  BackwardResult result;
+  renderBackward(workspace, picture, input, memory, result);
+  ASSERT_EQ(unhidden.size(), 3u);
+  const double seen = static_cast<double>(result.instances[0].blending_weights[0]);
+  EXPECT_GT(seen, 5);
+  // The integral of the Gaussian instead of a sum that ends at alpha = 1/255 of 0.8: 1/200 of it.
+  EXPECT_NEAR(static_cast<double>(unhidden[0]) / seen, 1.0 + 1.0 / 200, 2e-3);
+  EXPECT_EQ(unhidden[1], 0.0f);
+  EXPECT_EQ(unhidden[2], 0.0f);
 }
 
 TEST(ErrorContributions, SumAndLargestAgreeWithThePixelsOneByOne) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "base/error.h"
 #include "splat/reference_backward.h"
@@ -190,6 +191,22 @@ class ReferencePass final : public ViewPass {
     summary.visible_count =
         static_cast<uint64_t>(std::count(visible_.begin(), visible_.end(), uint8_t{1}));
     return summary;
+  }
+
+  ShownWeights shownWeights(Progress*) override {
+    poisonCopies();
+    const std::vector<float> gradient(image_.size(), 0.0f);
+    const std::vector<float> residual(image_.size() / 4 * 3, 0.0f);
+    by_ = backwardReference(cloud_, *camera_, options_, gradient, residual);
+    const SplatInstance instance{&cloud_};
+    std::vector<float> unhidden(cloud_.size(), 0.0f);
+    for (const ReferenceSplat& splat :
+         visibleInOrder(placeScene({&instance, 1}, *camera_, options_))) {
+      const Footprint<double>& f = splat.projected.footprint;
+      unhidden[splat.index] =
+          static_cast<float>(2 * std::numbers::pi * f.opacity / (f.l00 * f.l11));
+    }
+    return {copy(by_.blending_weights), copy(std::move(unhidden))};
   }
 
   std::span<const float> image() override { return copy(rounded(image_)); }

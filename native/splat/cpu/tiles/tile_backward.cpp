@@ -39,6 +39,7 @@ constexpr auto kTooLargeOrNegative = [](float value) {
 PixelLoss<double> lossAt(const PictureLoss& picture, size_t pixel) {
   const BackwardInput& input = *picture.input;
   PixelLoss<double> loss{};
+  if (picture.wants.mode == BackwardMode::kWeights) return loss;
   for (size_t c = 0; c < 4; ++c) {
     loss.gradient[c] = static_cast<double>(input.colour_gradient[pixel * 4 + c]);
   }
@@ -276,6 +277,7 @@ void TileBackward::judge(const void* context, size_t splat, uint32_t pixel, Back
 /// Rows of the derivative lie a picture's width apart, so the processor does not foresee them.
 void TileBackward::askForPixels(const Tile& tile) const {
   constexpr size_t kLineFloats = 16;
+  if (loss_->input->colour_gradient.empty()) return;
   for (uint32_t y = 0; y < tile.height; ++y) {
     const float* row = &loss_->input->colour_gradient[pixelOf(*loss_, tile, 0, y) * 4];
     for (size_t i = 0; i < tile.width * 4; i += kLineFloats) __builtin_prefetch(row + i);
@@ -344,8 +346,9 @@ uint32_t TileBackward::run(const Tile& tile, size_t index, const Tile* next, flo
   const uint32_t used = takeState(tile, index);
   if (!lossIsGood(tile)) input_is_good_ = false;
   if (!input_is_good_) return 0;
-  takeLoss(tile, index, background);
-  if (loss_->wants.mode != BackwardMode::kGradients) takeStatistics(tile);
+  const BackwardMode mode = loss_->wants.mode;
+  if (mode != BackwardMode::kWeights) takeLoss(tile, index, background);
+  if (mode != BackwardMode::kGradients && mode != BackwardMode::kWeights) takeStatistics(tile);
   WantedNext next_batch;
   if (next) {
     askForPixels(*next);

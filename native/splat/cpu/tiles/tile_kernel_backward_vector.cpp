@@ -89,6 +89,7 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
   constexpr bool kStatistics = kMode == BackwardMode::kStatistics;
   constexpr bool kContributions = kStatistics || kMode == BackwardMode::kContributions;
   constexpr bool kEdges = kMode == BackwardMode::kEdges;
+  constexpr bool kWeights = kMode == BackwardMode::kWeights;
   constexpr bool kCullsRows = kCulling != TileCulling::kNothing;
   constexpr bool kCullsLanes = kCulling == TileCulling::kAll;
   constexpr size_t kFieldCount = backwardFieldCount({kMode, kDepth});
@@ -161,6 +162,10 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
             hn::Div(hn::Load(d, pixels.transmittance + i), hn::Sub(one, alpha));
         hn::Store(transmittance, d, pixels.transmittance + i);
         const Vec weight = hn::Mul(transmittance, alpha);
+        if constexpr (kWeights) {
+          sum_weight = hn::Add(sum_weight, weight);
+          continue;
+        }
         const Vec by_red = hn::Load(d, pixels.gradient[0] + i);
         const Vec by_green = hn::Load(d, pixels.gradient[1] + i);
         const Vec by_blue = hn::Load(d, pixels.gradient[2] + i);
@@ -236,19 +241,24 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
       sum_g00 = hn::MulAdd(s_g0, g0, sum_g00);
       sum_g01 = hn::MulAdd(column_g1, g0, sum_g01);
     }
-    sumFour(d, sum_s, sum_g0, sum_g1, sum_g00, out);
-    sumFour(d, sum_g01, sum_g11, sum_red, sum_green, out + kFieldG01);
-    float four[4];
-    sumFour(d, sum_blue, sum_contribution, sum_weight, sum_edge, four);
-    out[kFieldBlue] = four[0];
-    if constexpr (kEdges) out[kFieldEdgeAlone] = four[3];
-    if constexpr (kContributions) out[kFieldContribution] = four[1];
-    if constexpr (kStatistics) std::copy(four + 2, four + 4, out + kFieldWeight);
+    if constexpr (kWeights) {
+      out[kFieldWeightAlone] = sumOfLanes(d, sum_weight);
+    } else {
+      sumFour(d, sum_s, sum_g0, sum_g1, sum_g00, out);
+      sumFour(d, sum_g01, sum_g11, sum_red, sum_green, out + kFieldG01);
+      float four[4];
+      sumFour(d, sum_blue, sum_contribution, sum_weight, sum_edge, four);
+      out[kFieldBlue] = four[0];
+      if constexpr (kEdges) out[kFieldEdgeAlone] = four[3];
+      if constexpr (kContributions) out[kFieldContribution] = four[1];
+      if constexpr (kStatistics) std::copy(four + 2, four + 4, out + kFieldWeight);
+    }
     if constexpr (kStatistics) {
       sumFour(d, sum_x, sum_y, sum_norm, sum_error, out + kFieldAbsoluteX);
       out[kFieldLargestError] = hn::GetLane(hn::MaxOfLanes(d, largest_error));
-      sumFour(d, sum_pixels, sum_pixel_errors, sum_distances, zero, four);
-      std::copy(four, four + 3, out + kFieldPixels);
+      float three[4];
+      sumFour(d, sum_pixels, sum_pixel_errors, sum_distances, zero, three);
+      std::copy(three, three + 3, out + kFieldPixels);
     }
     if constexpr (kDepth) out[kFieldCount - 1] = sumOfLanes(d, sum_depth);
     if (HWY_UNLIKELY(is_judged)) {
@@ -274,6 +284,8 @@ void takeOffInMode(const TileSplat* splats, size_t count, const TakeOffOptions& 
       return takeOffSplats<BackwardMode::kStatistics, kDepth>(splats, count, options, pixels, sums);
     case BackwardMode::kEdges:  // comes without depth
       return takeOffSplats<BackwardMode::kEdges, false>(splats, count, options, pixels, sums);
+    case BackwardMode::kWeights:  // the same
+      return takeOffSplats<BackwardMode::kWeights, false>(splats, count, options, pixels, sums);
   }
 }
 

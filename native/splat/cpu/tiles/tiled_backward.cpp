@@ -52,9 +52,17 @@ void requireRange(std::span<const float> values, float least, const char* what) 
   }
 }
 
+/// Whether nothing is asked for but blending weights, which need no loss.
+bool wantsOnlyWeights(const BackwardInput& input) {
+  return input.with_blending_weights && input.colour_gradient.empty() && input.residual.empty() &&
+         input.depth_gradient.empty() && input.edge_weights.empty() && input.errors.empty() &&
+         input.coverage_gradient == 0 && !input.with_screen_gradients &&
+         !input.with_absolute_screen_gradients && !input.with_covered;
+}
+
 void requireSizes(const KeptPicture& picture, const BackwardInput& input) {
   const size_t pixel_count = static_cast<size_t>(picture.width) * picture.height;
-  requireSize(input.colour_gradient, pixel_count, 4, false, "colour_gradient");
+  requireSize(input.colour_gradient, pixel_count, 4, wantsOnlyWeights(input), "colour_gradient");
   requireSize(input.depth_gradient, pixel_count, 1, true, "depth_gradient");
   requireSize(input.residual, pixel_count, 3, true, "residual");
   requireSize(input.residual_weights, pixel_count, 1, true, "residual_weights");
@@ -79,6 +87,7 @@ void requireRanges(const BackwardInput& input) {
 }
 
 BackwardWants wantsOf(const BackwardInput& input) {
+  if (wantsOnlyWeights(input)) return {BackwardMode::kWeights, false};
   const bool with_depth = !input.depth_gradient.empty();
   if (input.with_blending_weights || input.with_absolute_screen_gradients || input.with_covered ||
       !input.errors.empty()) {
@@ -95,7 +104,7 @@ BackwardWants wantsOf(const BackwardInput& input) {
 bool isWanted(const GradientArray& array, const BackwardInput& input) {
   const auto isOneOf = [&](auto... arrays) { return ((array.values == arrays) || ...); };
   using G = SplatGradients;
-  if (!array.is_statistic) return true;
+  if (!array.is_statistic) return !input.colour_gradient.empty();
   if (isOneOf(&G::contributions)) return !input.residual.empty();
   if (isOneOf(&G::blending_weights)) return input.with_blending_weights;
   if (isOneOf(&G::edge_weights)) return !input.edge_weights.empty();
@@ -184,7 +193,10 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, RenderWorkspace
 void storeStatistics(const BackwardInput& input, BackwardMode mode, const float* sums,
                      const double* mean, size_t index, SplatGradients& out) {
   if (!input.residual.empty()) out.contributions[index] = sums[kFieldContribution];
-  if (input.with_blending_weights) out.blending_weights[index] = sums[kFieldWeight];
+  if (input.with_blending_weights) {
+    out.blending_weights[index] =
+        sums[mode == BackwardMode::kWeights ? kFieldWeightAlone : kFieldWeight];
+  }
   if (!input.edge_weights.empty()) {
     out.edge_weights[index] = sums[mode == BackwardMode::kEdges ? kFieldEdgeAlone : kFieldEdge];
   }
@@ -226,7 +238,7 @@ void takeBackRows(BackProjector project, const PlacedScene& scene, const PlacedC
   if (!input.depth_gradient.empty()) summed.depth_field = sums.fieldCount() - 1;
   const BackwardMode mode = wantsOf(input).mode;
   const auto flush = [&] {
-    project(scene, placed, summed, out, means, camera);
+    if (mode != BackwardMode::kWeights) project(scene, placed, summed, out, means, camera);
     for (size_t i = 0; i < summed.count; ++i) {
       storeStatistics(input, mode, summed.sumsOf(i), means + i * 2, rows[i], out);
     }
