@@ -7,6 +7,21 @@
 
 namespace stipple {
 
+namespace {
+
+/// "1.50 GiB".
+std::string bytesText(uint64_t bytes) {
+  constexpr uint64_t kMebi = uint64_t{1} << 20;
+  constexpr uint64_t kGibi = uint64_t{1} << 30;
+  if (bytes < kMebi) return std::to_string(bytes) + " bytes";
+  const uint64_t unit = bytes < kGibi ? kMebi : kGibi;
+  const uint64_t hundredths = bytes % unit * 100 / unit;
+  return std::to_string(bytes / unit) + (hundredths < 10 ? ".0" : ".") +
+         std::to_string(hundredths) + (unit == kMebi ? " MiB" : " GiB");
+}
+
+}  // namespace
+
 uint64_t MemoryLimit::ofThisMachine() {
   constexpr uint64_t kPercent = 60;
   const uint64_t machine = platform::machineMemory();
@@ -23,17 +38,15 @@ void MemoryLimit::requireBudget(uint64_t budget, const char* unit,
     (bytes_of(middle) <= memory_limit_bytes ? fits : above) = middle;
   }
   fail(ErrorCode::kMemoryLimit, "this budget of " + std::to_string(budget) + " " + unit +
-                                    " would need up to " + std::to_string(bytes) +
-                                    " bytes; the memory limit is " +
-                                    std::to_string(memory_limit_bytes) + ", and at most " +
-                                    std::to_string(fits) + " " + unit + " fit");
+                                    " would need up to " + bytesText(bytes) +
+                                    "; the memory limit is " + bytesText(memory_limit_bytes) +
+                                    ", and at most " + std::to_string(fits) + " " + unit + " fit");
 }
 
 void MemoryLimit::requireMemory(uint64_t bytes, const char* what) const {
   if (bytes > memory_limit_bytes) {
-    fail(ErrorCode::kMemoryLimit, std::string(what) + " would need up to " + std::to_string(bytes) +
-                                      " bytes; the memory limit is " +
-                                      std::to_string(memory_limit_bytes));
+    fail(ErrorCode::kMemoryLimit, std::string(what) + " would need up to " + bytesText(bytes) +
+                                      "; the memory limit is " + bytesText(memory_limit_bytes));
   }
 }
 
@@ -42,11 +55,11 @@ void MemoryLimit::requirePictureMemory(uint64_t bytes, const std::string& what,
   const uint64_t machine = platform::machineMemory();
   if (bytes <= std::min(machine, memory_limit_bytes)) return;
   const std::string allowed = memory_limit_bytes <= machine
-                                  ? "the memory limit is " + std::to_string(memory_limit_bytes)
-                                  : "this machine has " + std::to_string(machine);
-  fail(ErrorCode::kMemoryLimit, what + " would need up to " + std::to_string(bytes) + " bytes, " +
-                                    std::to_string(pair_bytes) +
-                                    " of them for pairs of splat and tile; " + allowed);
+                                  ? "the memory limit is " + bytesText(memory_limit_bytes)
+                                  : "this machine has " + bytesText(machine);
+  fail(ErrorCode::kMemoryLimit, what + " would need up to " + bytesText(bytes) + ", " +
+                                    bytesText(pair_bytes) + " of it for pairs of splat and tile; " +
+                                    allowed);
 }
 
 }  // namespace stipple

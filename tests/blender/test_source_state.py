@@ -351,7 +351,7 @@ def test_work_beyond_the_memory_limit_is_refused(stipple, tmp_path, one_mebibyte
     for call in (lambda: ops.splats_import(filepath=str(tmp_path / 'in.ply')),
                  lambda: ops.splats_import(filepath=str(tmp_path / 'in_1.ply'), as_sequence=True),
                  ops.add_budget, lambda: ops.relink(again=True)):
-        scenes.refuses(call, 'the memory limit is 1048576')
+        scenes.refuses(call, 'the memory limit is 1.00 MiB')
     scenes.refuses(lambda: ops.splats_to_volume(filepath=str(tmp_path / 'out.vdb'), resolution=512),
                    '1 MiB are allowed')
     assert_equal(read(stipple, obj), before)

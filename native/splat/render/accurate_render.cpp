@@ -238,7 +238,7 @@ RenderMemory accurateMemory(std::span<const SplatInstance> instances, const Came
   const Camera large = n > 1 ? enlarged(camera, n) : camera;
   RenderMemory memory = isTiled(accuracy) ? renderMemory(instances, large, options)
                         : accuracy.precision == Precision::kFloat && hasImagePlane(camera)
-                            ? rayTileMemory(instances, large, options)
+                            ? rayTileMemory(instances, large, options, rayOptions(accuracy))
                             : rayMemory(instances, large, options);
   if (n > 1) {
     memory.result_bytes += renderMemory({}, camera, options).result_bytes;

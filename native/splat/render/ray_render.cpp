@@ -341,13 +341,18 @@ RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& c
   for (const SplatInstance& instance : instances) {
     splats += instance.cloud ? instance.cloud->size() : 0;
   }
+  return rayMemory(splats, instances.size(), camera, options);
+}
+
+RenderMemory rayMemory(uint64_t splats, size_t instance_count, const Camera& camera,
+                       const RenderOptions& options) {
   RenderMemory memory;
   // Made range by range, gathered (which may double its room), sorted; and the order.
   memory.splat_bytes =
       splats * (4 * std::max(sizeof(RaySplat), sizeof(AffineSplat)) + 2 * sizeof(uint32_t));
   if (options.object_order == ObjectOrder::kApart) {
     memory.splat_bytes += splats * sizeof(uint64_t);
-    memory.other_bytes += objectSortBound(splats, instances.size());
+    memory.other_bytes += objectSortBound(splats, instance_count);
   }
   if (hasPasses(options)) memory.splat_bytes += splats * (sizeof(Vec3d) + sizeof(uint32_t));
   // Of each thread, splats near its block and its tile, and those that show at a pixel.

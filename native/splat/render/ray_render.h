@@ -69,6 +69,8 @@ RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& 
                         Progress* progress = nullptr);
 
 /// Upper bound of the bytes that renderRays allocates: per splat, and its result.
+RenderMemory rayMemory(uint64_t splat_count, size_t instance_count, const Camera& camera,
+                       const RenderOptions& options);
 RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& camera,
                        const RenderOptions& options);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -38,8 +39,26 @@ inline double depthOf(const View<double>& view, const Vec3d& centre) {
   return view.is_wide ? centre.norm() : centre[2];
 }
 
-/// Splats that may show an alpha of least_alpha or more somewhere, centres between the near and the
-/// far plane; by rounded depth, then by place in the scene.
+/// The planes through the borders of a perspective or parallel picture.
+class ViewSides {
+ public:
+  explicit ViewSides(const View<double>& view);
+
+  /// False only for spheres that no ray through the picture meets. View space, metres.
+  bool touch(const Vec3d& centre, double radius) const;
+
+ private:
+  std::array<Vec3d, 4> inward_;  ///< unit normals
+  std::array<double, 4> offsets_;
+};
+
+/// Splats that may show an alpha of least_alpha or more in the picture, in a panorama or fisheye
+/// anywhere, centres between the near and the far plane; by rounded depth, then by place in the
+/// scene.
 std::vector<RaySplat> raySplats(const PlacedScene& scene, double least_alpha);
+
+/// How many splats raySplats, or affineSplats where is_affine, finds at most. In: a scene seen in a
+/// perspective or parallel view. Cost: a few operations a splat, nothing is projected.
+uint64_t mostRaySplats(const PlacedScene& scene, double least_alpha, bool is_affine);
 
 }  // namespace stipple

@@ -125,7 +125,7 @@ TEST_F(Boundary, RefusesABudgetAboveTheMemoryLimitBeforeItAllocates) {
   StippleCloud* cloud = nullptr;
   EXPECT_EQ(stipple_model_decode(model, &options, &cloud), STIPPLE_ERROR_MEMORY_LIMIT);
   const std::string message = stipple_last_error_message();
-  const std::string mark = "the memory limit is 67108864, and at most ";
+  const std::string mark = "the memory limit is 64.00 MiB, and at most ";
   ASSERT_NE(message.find(mark), std::string::npos) << message;
   options.anchor_count = std::stoull(message.substr(message.find(mark) + mark.size()));
   STIPPLE_EXPECT_OK(stipple_model_decode(model, &options, &cloud));

@@ -205,7 +205,7 @@ TEST_F(HierarchyApi, RefusesPicturesBeyondTheMemoryLimitBeforeItBegins) {
   stipple_refine_options_init(&refine);
   refine.view_count = 4096;
   EXPECT_EQ(stipple_cloud_refine_start(cloud, cloud, &refine, &job), STIPPLE_ERROR_MEMORY_LIMIT);
-  EXPECT_NE(std::string(stipple_last_error_message()).find("1073741824"), std::string::npos);
+  EXPECT_NE(std::string(stipple_last_error_message()).find("the memory limit is 1.00 GiB"), std::string::npos);
   // A picture of 65536 x 65536 pixels is 69 GB.
   StippleModelFromCloudOptions options;
   stipple_model_from_cloud_options_init(&options);

@@ -23,8 +23,8 @@ std::string refusal(uint64_t limit, uint64_t budget) {
 TEST(MemoryLimit, NamesTheBudgetThatFits) {
   EXPECT_EQ(refusal(750, 100), "");
   EXPECT_EQ(refusal(749, 100),
-            "this budget of 100 anchors would need up to 750 bytes; the memory limit is 749, and at "
-            "most 99 anchors fit");
+            "this budget of 100 anchors would need up to 750 bytes; the memory limit is 749 bytes, "
+            "and at most 99 anchors fit");
   EXPECT_NE(refusal(57, 1000000).find("at most 1 anchors fit"), std::string::npos);
   EXPECT_NE(refusal(40, 5).find("at most 0 anchors fit"), std::string::npos);
 }

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
+#include "splat/cpu/rays/ray_tiles.h"
 #include "splat/random_scene.h"
 
 // Every allocation of this test binary is counted, so that the bound is held against what a
@@ -142,6 +143,31 @@ TEST(RenderMemoryBound, CountsWhatObjectsApartTake) {
   RenderOptions apart;
   apart.object_order = ObjectOrder::kApart;
   EXPECT_LE(peakOf(instances, camera, apart), renderMemoryBound(instances, camera, apart) + 65536);
+}
+
+TEST(RayMemoryBound, IsThatOfTheSplatsInViewWhereThereAreMany) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the address sanitizer replaces the allocator that is counted here";
+#endif
+  CloudRecipe recipe;
+  recipe.count = size_t{1} << 20;
+  recipe.size_max = 0.006;
+  const SplatCloud cloud = randomCloud(recipe, 3);
+  const SplatInstance instance{&cloud};
+  // From the middle, through a long lens: nearly all is beyond the borders or behind.
+  const Camera camera = frontCamera(80, 60, 160, 0);
+  for (const RayProjection projection : {RayProjection::kRay, RayProjection::kAffine}) {
+    RayOptions rays;
+    rays.projection = projection;
+    const RenderMemory memory = rayTileMemory({&instance, 1}, camera, {}, rays);
+    EXPECT_LT(memory.splat_bytes, rayMemory({&instance, 1}, camera, {}).splat_bytes / 4);
+    const uint64_t bound = memory.sum();
+    const uint64_t before = held.load();
+    peak.store(before);
+    const RenderResult picture = renderRayTiles({&instance, 1}, camera, {}, rays);
+    EXPECT_GT(picture.visible_count, 1000u);
+    EXPECT_LE(peak.load() - before, bound + 65536);
+  }
 }
 
 TEST(RenderMemoryBound, StaysWithinItsShareOfEverySplatAndPixel) {

@@ -25,6 +25,8 @@ namespace {
 
 constexpr size_t kSplatsAtOnce = 64;
 constexpr size_t kTilesAtOnce = 8;
+/// So many splats are looked at before the memory of an image is told; of fewer, all may show.
+constexpr uint64_t kCountedFrom = 1 << 20;
 /// Sizes of g and w over |w| above which float32 leaves too few digits: alpha would be off by more
 /// than 2e-4 of itself. Only splats thinner than a quarter of a pixel, or met end-on, have such.
 constexpr double kMaxReach = 200;
@@ -390,12 +392,16 @@ RenderResult renderRayTiles(std::span<const SplatInstance> instances, const Came
 }
 
 RenderMemory rayTileMemory(std::span<const SplatInstance> instances, const Camera& camera,
-                           const RenderOptions& options) {
-  RenderMemory memory = rayMemory(instances, camera, options);
+                           const RenderOptions& options, const RayOptions& rays) {
   uint64_t splats = 0;
   for (const SplatInstance& instance : instances) {
     splats += instance.cloud ? instance.cloud->size() : 0;
   }
+  if (splats >= kCountedFrom) {
+    splats = mostRaySplats(placeScene(instances, camera, options), rays.limits.least_alpha,
+                           rays.projection == RayProjection::kAffine);
+  }
+  RenderMemory memory = rayMemory(splats, instances.size(), camera, options);
   // Made while the splats in their order are still there.
   memory.splat_bytes += splats * (sizeof(RayForm) + sizeof(RayReach));
   const TileGrid grid(camera.width, camera.height);

@@ -20,8 +20,9 @@ RenderResult renderRayTilesWith(RayTileKernel kernel, std::span<const SplatInsta
                                 const Camera& camera, const RenderOptions& options,
                                 const RayOptions& rays, Progress* progress = nullptr);
 
-/// Upper bound of the bytes that it allocates.
+/// Upper bound of the bytes that it allocates. From a million splats on, those that the picture can
+/// show are counted for it. Errors: those of renderRays, about clouds that are read then.
 RenderMemory rayTileMemory(std::span<const SplatInstance> instances, const Camera& camera,
-                           const RenderOptions& options);
+                           const RenderOptions& options, const RayOptions& rays);
 
 }  // namespace stipple
