@@ -7,17 +7,14 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/fresh_memory.h"
 #include "base/parallel.h"
-#include "base/platform/memory.h"
 
 namespace stipple {
 
 namespace {
 
 constexpr size_t kGrain = 8192;
-// Below four huge pages the rounding would cost more memory than the faults cost time.
-constexpr size_t kHugePageBytes = size_t{2} << 20;
-constexpr size_t kHugeFromBytes = 4 * kHugePageBytes;
 
 void requireSize(size_t seen, size_t expected, const char* what, const char* array) {
   if (seen != expected) {
@@ -25,25 +22,6 @@ void requireSize(size_t seen, size_t expected, const char* what, const char* arr
                                           std::to_string(seen) + " values; " +
                                           std::to_string(expected) + " are needed");
   }
-}
-
-/// resize() of an array that was empty. The first touch of a page of 4 KiB takes longer than
-/// filling it: pages of 2 MiB, where the system has them, touched by all threads.
-void resizeFresh(std::vector<float>& values, size_t count) {
-  if (!values.empty() || count <= values.capacity() || count * sizeof(float) < kHugeFromBytes) {
-    values.resize(count);
-    return;
-  }
-  values.reserve(count);
-  const auto begin = reinterpret_cast<uintptr_t>(values.data());
-  // Whole huge pages inside, so that nothing else of the heap changes.
-  const uintptr_t first = (begin + kHugePageBytes - 1) / kHugePageBytes * kHugePageBytes;
-  const uintptr_t last = (begin + count * sizeof(float)) / kHugePageBytes * kHugePageBytes;
-  platform::adviseHugePages(reinterpret_cast<void*>(first), last - first);
-  parallelFor((last - first) / kHugePageBytes, 1, [&](size_t page, size_t) {
-    platform::populatePages(reinterpret_cast<void*>(first + page * kHugePageBytes), kHugePageBytes);
-  });
-  values.resize(count);
 }
 
 }  // namespace

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
+#include <memory>
 #include <nanoflann.hpp>
 
+#include "base/fresh_memory.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "mesh/cell_table.h"
@@ -30,6 +33,9 @@ struct PlaceList {
 constexpr double kFarthest = 1e15;
 constexpr size_t kPlacesPerLeaf = 16;
 constexpr size_t kGrain = 1024;
+/// Places are searched in this many trees, of so many places at least.
+constexpr size_t kMostParts = 4;
+constexpr size_t kLeastPart = 8192;
 
 /// Places that many share. A search would pass over all of them for each, and find the same few.
 struct SharedPlaces {
@@ -94,29 +100,114 @@ void fillRings(const SharedPlaces& shared, size_t neighbour_count, std::vector<u
   }
 }
 
+/// The nearest that some trees, one after another, have found; as nanoflann wants it.
+class Nearest {
+ public:
+  explicit Nearest(size_t capacity) : rows_(capacity), squared_(capacity) {}
+
+  void begin() {
+    count_ = 0;
+    squared_.back() = std::numeric_limits<float>::max();
+  }
+  /// Of the places of one tree: what is added to their numbers.
+  void setFirst(size_t first) { first_ = static_cast<uint32_t>(first); }
+
+  float worstDist() const { return squared_.back(); }
+  size_t size() const { return count_; }
+  bool full() const { return count_ == rows_.size(); }
+  uint32_t row(size_t k) const { return rows_[k]; }
+
+  bool addPoint(float squared, uint32_t index) {
+    // A leaf asks for the worst once, before its first place.
+    if (full() && !(squared < worstDist())) return true;
+    size_t at = std::min(count_, rows_.size() - 1);
+    if (count_ < rows_.size()) ++count_;
+    for (; at > 0 && squared_[at - 1] > squared; --at) {
+      squared_[at] = squared_[at - 1];
+      rows_[at] = rows_[at - 1];
+    }
+    squared_[at] = squared;
+    rows_[at] = first_ + index;
+    return true;
+  }
+
+ private:
+  std::vector<uint32_t> rows_;
+  std::vector<float> squared_;
+  size_t count_ = 0;
+  uint32_t first_ = 0;
+};
+
+/// A tree over some of the places, and the box around them.
+template <int kWidth>
+class PlaceTree {
+ public:
+  PlaceTree(const PlaceList& all, size_t begin, size_t end)
+      : list_{all.places, all.width, all.rows.subspan(begin, end - begin)},
+        first_(begin),
+        low_(all.width, std::numeric_limits<float>::max()),
+        high_(all.width, std::numeric_limits<float>::lowest()),
+        tree_(static_cast<int>(all.width), list_,
+              nanoflann::KDTreeSingleIndexAdaptorParams(kPlacesPerLeaf)) {
+    tree_.buildIndex();
+    for (size_t i = 0; i < list_.rows.size(); ++i) {
+      const float* place = list_.place(i);
+      for (size_t axis = 0; axis < all.width; ++axis) {
+        low_[axis] = std::min(low_[axis], place[axis]);
+        high_[axis] = std::max(high_[axis], place[axis]);
+      }
+    }
+  }
+
+  /// Adds what is nearer than the worst of those found.
+  void search(const float* place, Nearest& nearest) const {
+    float squared = 0;
+    for (size_t axis = 0; axis < low_.size(); ++axis) {
+      const float beyond = std::max({low_[axis] - place[axis], place[axis] - high_[axis], 0.0f});
+      squared += beyond * beyond;
+    }
+    if (!(squared < nearest.worstDist())) return;
+    nearest.setFirst(first_);
+    tree_.findNeighbors(nearest, place, nanoflann::SearchParams());
+  }
+
+ private:
+  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PlaceList>,
+                                                   PlaceList, kWidth, uint32_t>;
+  PlaceList list_;
+  size_t first_;
+  std::vector<float> low_, high_;
+  Tree tree_;
+};
+
 /// kWidth: numbers of a place; -1: as many as the list says.
 template <int kWidth>
 void search(const PlaceList& list, size_t neighbour_count, std::vector<uint32_t>& rows) {
-  using PlaceTree =
-      nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PlaceList>, PlaceList,
-                                          kWidth, uint32_t>;
   const size_t count = list.rows.size();
   if (count < 2) return;
-  PlaceTree tree(static_cast<int>(list.width), list,
-                 nanoflann::KDTreeSingleIndexAdaptorParams(kPlacesPerLeaf));
-  tree.buildIndex();
+  // The library builds a tree on one thread. Rows follow each other in space, so parts of them
+  // hardly overlap.
+  const size_t part_size = std::max<size_t>(kLeastPart, (count + kMostParts - 1) / kMostParts);
+  std::vector<std::unique_ptr<PlaceTree<kWidth>>> trees(rangeCount(count, part_size));
+  parallelFor(count, part_size, [&](size_t begin, size_t end) {
+    trees[begin / part_size] = std::make_unique<PlaceTree<kWidth>>(list, begin, end);
+  });
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
     // One more than wanted: the place finds itself, unless it has as many twins.
-    std::vector<uint32_t> found(neighbour_count + 1);
-    std::vector<float> squared(neighbour_count + 1);
+    Nearest nearest(neighbour_count + 1);
     for (size_t i = begin; i < end; ++i) {
-      const size_t found_count =
-          tree.knnSearch(list.place(i), neighbour_count + 1, found.data(), squared.data());
+      const float* place = list.place(i);
+      const size_t own = i / part_size;
+      nearest.begin();
+      trees[own]->search(place, nearest);
+      for (size_t part = 0; part < trees.size(); ++part) {
+        if (part != own) trees[part]->search(place, nearest);
+      }
       uint32_t* row = &rows[list.rows[i] * neighbour_count];
       // What stands in the row already is of the same place.
       size_t kept = static_cast<size_t>(std::find(row, row + neighbour_count, kNoPlace) - row);
-      for (size_t k = 0; k < found_count && kept < neighbour_count; ++k) {
-        if (found[k] != i) row[kept++] = list.rows[found[k]];
+      for (size_t k = 0; k < nearest.size() && kept < neighbour_count; ++k) {
+        if (nearest.row(k) != i) row[kept++] = list.rows[nearest.row(k)];
       }
     }
   });
@@ -131,10 +222,13 @@ std::vector<uint32_t> nearestNeighbours(std::span<const double> places, size_t n
   if (count < 2) return rows;
   // Distances as float32: neighbours that it cannot tell apart serve alike. Their squares stay in
   // range.
-  std::vector<float> rounded(places.size());
-  for (size_t i = 0; i < rounded.size(); ++i) {
-    rounded[i] = static_cast<float>(std::clamp(places[i], -kFarthest, kFarthest));
-  }
+  std::vector<float> rounded;
+  resizeFresh(rounded, places.size());
+  parallelFor(rounded.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      rounded[i] = static_cast<float>(std::clamp(places[i], -kFarthest, kFarthest));
+    }
+  });
   const SharedPlaces shared = sharedPlaces(rounded, width, 2 * neighbour_count);
   fillRings(shared, neighbour_count, rows);
   const PlaceList list{rounded, width, shared.single};

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/atomic_ref.h"
+#include "base/fresh_memory.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "decode/tree/merge_neighbours.h"
@@ -38,7 +39,7 @@ class MergeRounds {
     ids_.resize(count_);
     active_.resize(count_);
     for (size_t i = 0; i < count_; ++i) ids_[i] = active_[i] = static_cast<uint32_t>(i);
-    entries_.resize(count_ * kListCapacity);
+    resizeFresh(entries_, count_ * kListCapacity);
     sizes_.assign(count_, 0);
     best_.assign(count_, {0.0f, kNone});
     stale_.assign(count_, 1);
@@ -106,8 +107,11 @@ class MergeRounds {
   void searchNeighbours() {
     const size_t count = active_.size();
     const size_t width = nodes_.placeWidth();
-    std::vector<double> places(count * width);
-    nodes_.places(active_, places.data());
+    std::vector<double> places;
+    resizeFresh(places, count * width);
+    parallelFor(count, kGrain * 16, [&](size_t begin, size_t end) {
+      nodes_.places(std::span(active_).subspan(begin, end - begin), &places[begin * width]);
+    });
     for (const uint32_t slot : active_) sizes_[slot] = 0;
     const std::vector<uint32_t> rows = nearestNeighbours(places, kMergeNeighbours, width);
     const auto append = [&](uint32_t slot, uint32_t other) {
@@ -196,13 +200,34 @@ class MergeRounds {
         }
       }
     });
-    pairs_.clear();
-    for (const uint32_t slot : active_) {
+    const auto isPair = [&](uint32_t slot) {
       const uint32_t other = best_[slot].slot;
-      if (other != kNone && slot < other && best_[other].slot == slot) {
-        pairs_.push_back({slot, other});
+      return other != kNone && slot < other && best_[other].slot == slot;
+    };
+    const std::vector<uint32_t> first = chosen(active_, isPair);
+    pairs_.clear();
+    for (const uint32_t slot : first) pairs_.push_back({slot, best_[slot].slot});
+  }
+
+  /// Those slots of a list that are chosen, in its order.
+  template <typename IsChosen>
+  static std::vector<uint32_t> chosen(const std::vector<uint32_t>& slots, IsChosen is_chosen) {
+    constexpr size_t kPart = kGrain * 32;
+    std::vector<std::vector<uint32_t>> parts(rangeCount(slots.size(), kPart));
+    parallelFor(slots.size(), kPart, [&](size_t begin, size_t end) {
+      std::vector<uint32_t>& part = parts[begin / kPart];
+      part.reserve(end - begin);
+      for (size_t i = begin; i < end; ++i) {
+        if (is_chosen(slots[i])) part.push_back(slots[i]);
       }
-    }
+    });
+    if (parts.size() == 1) return std::move(parts[0]);
+    std::vector<uint32_t> all;
+    size_t count = 0;
+    for (const std::vector<uint32_t>& part : parts) count += part.size();
+    all.reserve(count);
+    for (const std::vector<uint32_t>& part : parts) all.insert(all.end(), part.begin(), part.end());
+    return all;
   }
 
   void mergePairs() {
@@ -237,7 +262,7 @@ class MergeRounds {
     std::vector<uint32_t> merged(pairs_.size());
     for (size_t i = 0; i < merged.size(); ++i) merged[i] = pairs_[i].first;
     keepMutual(merged);
-    std::erase_if(active_, [&](uint32_t slot) { return alias_[slot] != slot; });
+    active_ = chosen(active_, [&](uint32_t slot) { return alias_[slot] == slot; });
     parallelFor(active_.size(), kGrain * 16, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const uint32_t slot = active_[i];

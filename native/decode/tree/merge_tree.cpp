@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/fresh_memory.h"
 #include "base/parallel.h"
 #include "data/clouds/cloud_extent.h"
 #include "decode/tree/merge_cost.h"
@@ -27,7 +28,8 @@ class StandingNodes final : public MergingNodes {
  public:
   StandingNodes(const SplatCloud& leaves, const std::vector<uint32_t>& order,
                 std::span<const float> visibility, const MergeScale& scale, SplatCloud& merged)
-      : scale_(scale), nodes_(leaves.size()), merged_(merged), harmonics_(leaves, order, merged) {
+      : scale_(scale), merged_(merged), harmonics_(leaves, order, merged) {
+    resizeFresh(nodes_, leaves.size());
     parallelFor(nodes_.size(), kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const double seen = visibility.empty() ? 1.0 : countedVisibility(visibility[order[i]]);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/fresh_memory.h"
 #include "base/parallel.h"
 #include "mesh/cell_table.h"
 
@@ -64,7 +65,8 @@ std::vector<uint32_t> numberNodes(const std::vector<Merge>& merges,
 }
 
 void gatherRows(std::vector<float>& values, size_t stride, const std::vector<uint32_t>& from) {
-  std::vector<float> gathered(from.size() * stride);
+  std::vector<float> gathered;
+  resizeFresh(gathered, from.size() * stride);
   parallelFor(from.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       std::copy_n(&values[from[i] * stride], stride, &gathered[i * stride]);
