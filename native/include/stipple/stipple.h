@@ -2100,8 +2100,8 @@ typedef struct StippleFitOptions {
   double middle_level_rank;    /* relay: 0..1, share of anchors with less varied features than the middle level
                                   has, default 0.5 */
   double high_level_rank;      /* the same of the high level, at least as much, default 0.8 */
-  double middle_level_weight;  /* relay: 0..1 of the gradients that growth begins with, default 0.5 */
-  double high_level_weight;    /* the same of the high level, default 0.25 */
+  double middle_level_weight;  /* relay: 0..1 of the gradients that growth begins with, default 0.25 */
+  double high_level_weight;    /* the same of the high level, default 0 */
 } StippleFitOptions;
 void stipple_fit_options_init(StippleFitOptions* options);
 /* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.

@@ -23,7 +23,7 @@ struct RelayModelOptions {
   std::array<double, 2> level_quantiles = {0.5, 0.8};
   /// By which gradients of these two levels count at the begin of a segment, 0..1; the weights rise
   /// to 1 at its end.
-  std::array<double, 2> level_weights = {0.5, 0.25};
+  std::array<double, 2> level_weights = {0.25, 0.0};
   uint64_t iterations = 30000;
 };
 
