@@ -50,13 +50,14 @@ FROM_GCC = {
 FOR_WINDOWS = {
     'mingw-w64': ('mingw-w64-x86-64-dev', 'mingw-w64: the start of programs, functions of C99, threads of POSIX'),
 }
-# What zig adds instead of GCC: the file in its folder, and what it is. The unwinder of macOS is the system's own.
+# What zig adds instead of GCC: the file in its folder, and what it is. macOS has an unwinder of its own, and the
+# functions that the compiler calls.
 FROM_ZIG = {
     'libc++': ('lib/libcxx/LICENSE.TXT', "LLVM's libc++"),
     'libc++abi': ('lib/libcxxabi/LICENSE.TXT', "LLVM's libc++abi: exceptions"),
-    'zig': ('LICENSE', "zig's compiler-rt: arithmetic that processors lack"),
 }
 FROM_ZIG_ON_LINUX = {
+    'zig': ('LICENSE', "zig's compiler-rt: arithmetic that processors lack"),
     'libunwind': ('lib/libunwind/LICENSE.TXT', "LLVM's libunwind: exceptions"),
     'glibc': ('lib/libc/glibc/LICENSES', 'the few functions of the GNU C library that every program holds'),
 }

@@ -75,8 +75,9 @@ linked_in() { # NAME
   tr ' ' '\n' <<<"$linked" | grep "/$1\$" | tail -1
 }
 if [[ $kind == macos_* ]]; then
-  # For LLVM's linker.
-  for name in libc++.a libc++abi.a libcompiler_rt.a; do
+  # For LLVM's linker. zig's own functions for the compiler stay away: macOS has those that are needed, and with them
+  # would come exp, memcpy and others that macOS has, too, and which round otherwise.
+  for name in libc++.a libc++abi.a; do
     cp "$(linked_in $name)" "$parts/lib/$name"
   done
   cp "$folder/zig/lib/libc/darwin/libSystem.11.tbd" "$parts/lib/libSystem.tbd"

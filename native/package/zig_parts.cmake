@@ -1,5 +1,5 @@
-# What the packages of macOS and of Linux on ARM are put together from, with the toolchains that include zig.cmake. zig
-# links libc++ and the compiler's own functions in.
+# What the packages of macOS and of Linux on ARM are put together from, with the toolchains that include zig.cmake. libc++
+# is linked in, and on Linux what zig has for the compiler.
 include(${CMAKE_CURRENT_LIST_DIR}/cross_parts.cmake)
 # Warnings of the other compiler are looked at there.
 target_compile_options(stipple_flags INTERFACE -Wno-error)
@@ -26,7 +26,7 @@ endif()
 # zig would link in lies beside the other parts.
 find_program(STIPPLE_LD64 NAMES ld64.lld-16 REQUIRED)
 set(lib ${STIPPLE_PACKAGE_PARTS}/lib)
-set(libraries "${lib}/libc++.a ${lib}/libc++abi.a ${lib}/libcompiler_rt.a ${lib}/libSystem.tbd")
+set(libraries "${lib}/libc++.a ${lib}/libc++abi.a ${lib}/libSystem.tbd")
 string(REGEX REPLACE "^.*-macos\\." "" version ${STIPPLE_ZIG_TARGET})
 set(linker "${STIPPLE_LD64} -arch ${CMAKE_SYSTEM_PROCESSOR} -platform_version macos ${version} ${version}")
 string(APPEND linker " -dead_strip -x -adhoc_codesign")

@@ -19,6 +19,9 @@ HEADER = 'native/include/stipple/stipple.h'
 NAME = 'libstipple.dylib'
 TARGETS = {'arm64': 'arm64-macos', 'x64': 'x86_64-macos'}
 WRITE, EXECUTE = 2, 4
+# Some that every system's C library has and that the library calls.
+COPYING = {'memcpy', 'memmove', 'memset', 'memcmp'}
+PLAIN_FUNCTIONS = {'exp', 'exp2', 'log', 'log10', 'sin', 'cos', 'tan', 'expf', 'exp2f', 'log2', 'logf'} | COPYING
 
 
 def symbols(file, kind):
@@ -58,8 +61,9 @@ def test_the_zip_is_small_and_for_this_kind_of_mac(macos_zip):
         assert not [name for name in archive.namelist() if name.endswith(('.so', '.dll'))]
         for folder in [folder for folder, _ in licences.COMPILED.values()] + list(licences.FROM_ZIG):
             assert f'stipple/licences/{folder}.txt' in archive.namelist()
-        # Nothing of GCC is inside.
-        assert 'stipple/licences/gcc.txt' not in archive.namelist()
+        # Nothing of GCC and nothing of zig's own is inside.
+        for name in ('gcc', 'zig'):
+            assert f'stipple/licences/{name}.txt' not in archive.namelist()
 
 
 def test_the_library_is_for_this_kind_of_mac_from_macos_11_on(macos_zip, library):
@@ -82,6 +86,12 @@ def test_the_system_of_that_age_has_every_name_that_is_asked_for(macos_zip, libr
     assert len(asked) > 100 and 'malloc' in asked and 'stipple_version_string' not in asked
     # C names have an underscore before them; that by which the loader finds others has none.
     assert sorted(name for name in asked if f'_{name}' not in known and name not in known) == []
+
+
+def test_functions_of_the_system_are_the_ones_called(library, tool):
+    # zig brings its own, which round otherwise. What is linked in is not looked for in the system.
+    assert PLAIN_FUNCTIONS - symbols(library, ['--undefined-only']) == set()
+    assert COPYING - symbols(tool, ['--undefined-only']) == set()
 
 
 def test_no_name_is_shared_with_what_else_blender_has_loaded(library):
