@@ -38,8 +38,7 @@ blender --version | head -1
 exec ctest --test-dir "build/$suite" --output-on-failure --parallel 1 "$@"
 INSIDE
 
-# The zip as Blender installs it, and then the add-on's tests with the add-on and the library that lie in it. What
-# test_install.py looks at is a zip of an ordinary build.
+# The zip as Blender installs it, and then the add-on's tests with the add-on and the library that lie in it.
 read -r -d '' install_and_test <<'INSIDE' || true
 zip=$1 && shift
 set -e
@@ -48,7 +47,8 @@ if command -v c++; then
   exit 1
 fi
 blender --version | head -1
-STIPPLE_ZIP=$PWD/$zip python3 -m pytest -q -rs -p no:cacheprovider tests/package/test_in_blender.py
+export STIPPLE_ZIP=$PWD/$zip
+python3 -m pytest -q -rs -p no:cacheprovider tests/package/test_in_blender.py
 unpacked=$(mktemp -d)
 python3 -m zipfile -e "$zip" "$unpacked"
 STIPPLE_BUILD_DIR=$PWD/build/portable python3 tests/blender/run.py --addon "$unpacked/stipple" \
@@ -61,7 +61,6 @@ for suite in "${suites[@]}"; do
   root=$folder/$suite${kind[0]:+-${kind[0]}}
   bash tests/blender_suite.sh prepare "$suite" "$root" "${kind[@]}"
   if [[ -n $zip ]]; then
-    ((${#chosen[@]})) || chosen=(-k 'not test_install')
     command=("$install_and_test" sh "$zip")
   else
     ((${#chosen[@]})) || chosen=(-R '^(addon|blender|blend_fixtures|cli)\.')

@@ -21,7 +21,7 @@ TARGETS = {'arm64': 'arm64-macos', 'x64': 'x86_64-macos'}
 WRITE, EXECUTE = 2, 4
 # Some that every system's C library has and that the library calls.
 COPYING = {'memcpy', 'memmove', 'memset', 'memcmp'}
-PLAIN_FUNCTIONS = {'exp', 'exp2', 'log', 'log10', 'sin', 'cos', 'tan', 'expf', 'exp2f', 'logf', 'log2f'} | COPYING
+PLAIN_FUNCTIONS = {'exp', 'exp2', 'log', 'log10', 'sin', 'cos', 'tan', 'expf', 'exp2f', 'log2', 'logf'} | COPYING
 
 
 def symbols(file, kind):

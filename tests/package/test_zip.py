@@ -95,6 +95,18 @@ def test_another_platforms_zip_is_refused(installed):
                                f'{contents.this_platform()}.')
 
 
+@pytest.mark.parametrize('platform', sorted(set(make_zip.SELF_CONTAINED_LIBRARIES) - {contents.this_platform()}))
+def test_the_zip_of_any_other_platform_is_refused_as_it_is(libraries, tmp_path, platform):
+    """Where its library has another name than this system's, that one is missing: the same sentence."""
+    (name,) = make_zip.SELF_CONTAINED_LIBRARIES[platform]
+    (tmp_path / name).write_bytes((libraries / 'libstipple.so').read_bytes())
+    make_zip.make(tmp_path, tmp_path / 'other.zip', (name,), platform=platform)
+    with zipfile.ZipFile(tmp_path / 'other.zip') as archive:
+        archive.extractall(tmp_path)
+    assert said(tmp_path / 'stipple') == (f'This is the download of Stipple for {platform}; this machine needs the one '
+                                          f'for {contents.this_platform()}.')
+
+
 def test_another_version_of_the_addon_is_refused(installed):
     edit_contents(installed, version='9.8.7')
     assert f'are of version 9.8.7 and the add-on is of version {make_zip.version()}' in said(installed)

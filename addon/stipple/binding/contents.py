@@ -30,17 +30,12 @@ def check(library):
     Errors: LibraryError with one sentence where the list is of another platform or another version of the add-on, or
     where a file is not as listed.
     """
-    listing = library.parent / FILE_NAME
-    if not listing.is_file():
+    listed = _read(library)
+    if listed is None:
         return
-    try:
-        contents = json.loads(listing.read_text(encoding='utf-8'))
-        made_for, version, files = contents['platform'], contents['version'], dict(contents['files'])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise LibraryError(f"'{listing}' is damaged ({error}); install the add-on again.") from None
+    made_for, version, files = listed
     if made_for != this_platform():
-        raise LibraryError(f'This is the download of Stipple for {made_for}; this machine needs the one for '
-                           f'{this_platform()}.')
+        raise LibraryError(_of_another_platform(made_for))
     expected = _addon_version(library.parent.parent)
     if expected and version != expected:
         raise LibraryError(f"The Stipple libraries in '{library.parent}' are of version {version} and the add-on is of "
@@ -52,6 +47,31 @@ def check(library):
         if sum_of(file) != digest:
             raise LibraryError(f"The Stipple library '{file}' is damaged: it is not the file that this add-on came "
                                "with; install the add-on again and restart Blender.")
+
+
+def platform_problem(library):
+    """A sentence where the folder of a library, which may be missing, is of another platform's zip, else ''."""
+    try:
+        listed = _read(library)
+    except LibraryError as error:
+        return str(error)
+    return '' if listed is None or listed[0] == this_platform() else _of_another_platform(listed[0])
+
+
+def _read(library):
+    """(platform, version, {name: sum}) of the list beside a library, None where there is none. Errors: LibraryError."""
+    listing = library.parent / FILE_NAME
+    if not listing.is_file():
+        return None
+    try:
+        contents = json.loads(listing.read_text(encoding='utf-8'))
+        return contents['platform'], contents['version'], dict(contents['files'])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise LibraryError(f"'{listing}' is damaged ({error}); install the add-on again.") from None
+
+
+def _of_another_platform(made_for):
+    return f'This is the download of Stipple for {made_for}; this machine needs the one for {this_platform()}.'
 
 
 def sum_of(file):

@@ -74,8 +74,10 @@ def _relative(file):
 
 
 def _missing(file):
-    return (f"The Stipple library '{file}' is missing; install the add-on again or set the library's path in the "
-            "add-on's preferences.")
+    # The zip of another system has the library under another name.
+    return contents.platform_problem(file) or (
+        f"The Stipple library '{file}' is missing; install the add-on again or set the library's path in the "
+        "add-on's preferences.")
 
 
 def _load(file):
