@@ -210,13 +210,16 @@ def _import(path, scene):
     shown = None if window is None else window.scene
     layer = scene.view_layers[0]
     try:
+        if window is not None:
+            # The active object is that of the window's scene, whatever is overridden: glTF's importer asks for it.
+            window.scene = scene
         with version.importing(), bpy.context.temp_override(scene=scene, view_layer=layer, collection=scene.collection,
                                                             layer_collection=layer.layer_collection):
             result = operator(filepath=path)
     except Exception as error:  # importers are anyone's
         raise LeftOutError(f'it cannot be read: {_said(error)}') from None
     finally:
-        if window is not None and window.scene != shown:  # glTF's importer does so for armatures
+        if window is not None:
             window.scene = shown
     if 'FINISHED' not in result:
         raise LeftOutError("it cannot be read; Blender's messages are in the console")
