@@ -118,12 +118,6 @@ const SplatFormat& requireFormat(uint64_t index) {
   return splatFormats()[static_cast<size_t>(index)];
 }
 
-/// Refuses what a file held where the memory limit leaves no room for it.
-void requireRoom(const SplatCloud& cloud, const std::string& path, const MemoryLimit& limit) {
-  const uint64_t floats = cloud.size() * (11 + cloud.shStride());
-  limit.requireMemory(floats * sizeof(float), ("the splats of '" + path + "'").c_str());
-}
-
 std::vector<const SplatCloud*> cloudsOf(const StippleCloud* const* levels, uint64_t level_count) {
   std::vector<const SplatCloud*> clouds;
   for (uint64_t i = 0; i < level_count; ++i) {

@@ -93,6 +93,11 @@ RenderOptions optionsFrom(const StippleRenderOptions& given) {
 
 }  // namespace
 
+void requireRoom(const SplatCloud& cloud, const std::string& path, const MemoryLimit& limit) {
+  const uint64_t floats = cloud.size() * (11 + cloud.shStride());
+  limit.requireMemory(floats * sizeof(float), ("the splats of '" + path + "'").c_str());
+}
+
 SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
   StippleCloudSaveOptions defaults;
   stipple_cloud_save_options_init(&defaults);

@@ -37,6 +37,9 @@ ShotSettings shotFrom(const StippleRenderOptions* options, const Instances& inst
 /// NULL: defaults.
 VoxelizeOptions voxelizeOptionsFrom(const StippleVoxelizeOptions* options);
 
+/// Refuses what a file held where the memory limit leaves no room for it.
+void requireRoom(const SplatCloud& cloud, const std::string& path, const MemoryLimit& limit);
+
 /// The images of views. Errors: kInvalidArgument where there are cameras alone.
 std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views);
 

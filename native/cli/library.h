@@ -38,6 +38,7 @@ using Renderer = Handle<StippleRenderer, stipple_renderer_free>;
 using Volume = Handle<StippleVolume, stipple_volume_free>;
 using Image = Handle<StippleImage, stipple_image_free>;
 using Weights = Handle<StippleWeights, stipple_weights_free>;
+using SeriesReader = Handle<StippleSeriesReader, stipple_series_reader_free>;
 using SeriesWriter = Handle<StippleSeriesWriter, stipple_series_writer_free>;
 using Binding = Handle<StippleBinding, stipple_binding_free>;
 using Job = Handle<StippleJob, stipple_job_free>;

@@ -242,3 +242,51 @@ def test_export_of_a_model_with_a_keyframed_budget(stipple, tmp_path):
     scene.frame_set(1)
     bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), frames='SCENE')
     assert [load(stipple, tmp_path / f'out_000{i}.ply').count for i in (1, 2)] == [100, 300]
+
+
+def test_one_file_of_usd_becomes_a_series_again(stipple, swarm, tmp_path):
+    scene = bpy.context.scene
+    out = tmp_path / 'walk.usdz'
+    bpy.ops.stipple.splats_export(filepath=str(out), frames='SERIES')
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
+    scene.render.fps = 48
+    for number, folder in ((0, 'walk'), (1, 'walk.001')):
+        assert bpy.ops.stipple.splats_import(filepath=str(out), as_sequence=True) == {'FINISHED'}
+        files = tmp_path / 'stipple' / folder
+        assert names(files) == [f'walk_000{i}.ply' for i in (1, 2, 3, 4)]
+        settings = bpy.context.object.data.stipple
+        assert settings.is_sequence and settings.frame_duration == 4
+        assert settings.source.endswith(f'{folder}/walk_0001.ply')
+        # Two frames of the scene pass for each of the file, whose first is at 1.
+        assert (settings.frame_start, settings.frame_speed) == (2, 0.5)
+    assert bpy.context.object.name.startswith('walk')
+    for frame, local in ((2, 1), (4, 2), (5, 2), (8, 4)):
+        scene.frame_set(frame)
+        expected = series.arrays_of(stipple, local)
+        shown = stipple.scene.source.splat_data.read(bpy.context.object.data)
+        placed = shown.positions @ np.array(bpy.context.object.matrix_world)[:3, :3].T
+        np.testing.assert_allclose(placed, expected.positions, atol=1e-5)
+
+
+def test_one_file_without_the_option_shows_its_first_frame_and_says_so(stipple, swarm, tmp_path, capfd):
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'walk.usda'), frames='SERIES')
+    capfd.readouterr()
+    assert bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'walk.usda')) == {'FINISHED'}
+    assert "'walk.usda' holds splats at 4 times, of which the first is shown" in capfd.readouterr().out
+    assert not bpy.context.object.data.stipple.is_sequence
+    assert stipple.scene.source.splat_data.count(bpy.context.object.data) == series.COUNT
+
+
+def test_a_split_that_stops_leaves_nothing(stipple, swarm, tmp_path, monkeypatch):
+    advance = stipple.jobs.Task.advance
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'walk.usda'), frames='SERIES')
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
+
+    def cancel_at_frame_3(self, fraction, stage):
+        if stage == 'Frame 3 of 4':
+            self.cancel()
+        advance(self, fraction, stage)
+
+    monkeypatch.setattr(stipple.jobs.Task, 'advance', cancel_at_frame_3)
+    assert bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'walk.usda'), as_sequence=True) == {'CANCELLED'}
+    assert names(tmp_path / 'stipple') == []

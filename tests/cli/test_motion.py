@@ -180,3 +180,21 @@ def test_a_series_says_what_it_cannot_take(model, tmp_path):
     assert '.usdz can' in error('series', model, tmp_path / 'a.ply')
     assert 'frames per second' in error('series', model, tmp_path / 'a.usda', '--frame-rate', 0)
     assert not (tmp_path / 'a.usda').exists()
+
+
+def test_one_file_becomes_files_of_its_frames_again(model, tmp_path):
+    run('series', model, tmp_path / 'film.usdz', '--frame-rate', 8, '--anchors', 20, '--first', 98)
+    seen = json.loads(run('series', tmp_path / 'film.usdz', tmp_path / 'walk_##.ply', '--first', 98, '--json').stdout)
+    assert seen == {'frames': 9, 'splats': 9 * 20}
+    assert sorted(f.name for f in tmp_path.glob('walk_*')) == sorted(f'walk_{i:02}.ply' for i in range(98, 107))
+    run('decode', model, tmp_path / 'last.usdz', '--anchors', 20, '--time', 1)
+    run('convert', tmp_path / 'last.usdz', tmp_path / 'last.ply')
+    assert (tmp_path / 'walk_106.ply').read_bytes() == (tmp_path / 'last.ply').read_bytes()
+    assert (tmp_path / 'walk_98.ply').read_bytes() != (tmp_path / 'last.ply').read_bytes()
+
+
+def test_what_cannot_be_split_is_named(model, tmp_path):
+    run('decode', model, tmp_path / 'a.ply', '--anchors', 20)
+    assert 'is no file that may hold a series' in error('series', tmp_path / 'a.ply', tmp_path / 'b#.ply')
+    assert 'two places for a number' in error('series', tmp_path / 'a.ply', tmp_path / 'b#c#.ply')
+    assert 'one file of USD' in error('series', tmp_path / 'a.ply', tmp_path / 'a.ply', tmp_path / 'b#.ply')

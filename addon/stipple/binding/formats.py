@@ -18,7 +18,7 @@ class SplatFormat:
     can_write: bool
     max_sh_degree: int  # that it holds
     frame: Frame        # that positions are written in
-    holds_times: bool   # one file may hold a series (series_writer.py)
+    holds_times: bool   # one file may hold a series (series_file.py)
     keeps: frozenset    # of 'frame', 'colour_space' and 'antialias': what its files say of their splats
 
 

@@ -75,6 +75,11 @@ class StippleCloudSaveOptions(_Sized):
                 ('format_version', c_uint32), ('frame', c_uint32), ('half', c_uint32)]
 
 
+class StippleSeriesInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('frame_count', c_uint64),
+                ('frames_per_second', c_double)]
+
+
 class StippleFormatInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('can_read', c_uint32), ('can_write', c_uint32),
                 ('max_sh_degree', c_uint32), ('frame', c_uint32), ('reserved', c_uint32),

@@ -5,14 +5,12 @@ import os
 
 import bpy
 
-from .. import binding, late
-from ..binding import structs
-from ..binding.errors import StippleError, invalid
+from .. import binding
+from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene.sequence import numbered, sequences
+from ..scene.sequence import numbered, sequences, series_folder
 from ..scene.source import source_paths, source_settings, sources, splat_data, sync
 
-shutil = late.module('shutil')
 
 class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
     """Make a tree of merges for every file of the series and keep them beside the .blend: budgets then show the least
@@ -45,9 +43,7 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
         name = os.path.basename(stem)
 
         def work(task):
-            folder = f'{stem}.{os.getpid()}.new'
-            try:
-                os.makedirs(folder)
+            def fill(folder):
                 for i, number in enumerate(numbers):
                     part = (i / len(numbers), (i + 1) / len(numbers))
                     task.advance(part[0], f'File {i + 1} of {len(numbers)}')
@@ -55,12 +51,7 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
                     made = task.run(binding.model.Model.from_cloud_start(native, cloud), *part)
                     model = binding.model.Model.of_job(made)
                     model.save(os.path.join(folder, f'{name}_{number:04d}{sources.MODEL_SUFFIX}'))
-                return _rename(folder, stem), len(numbers), name
-            except OSError as error:
-                raise StippleError(f"The folder '{folder}' cannot be written: {error.strerror}.",
-                                   structs.Status.ERROR_IO) from None
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
+            return series_folder.write(stem, fill), len(numbers), name
         return Task(work)
 
     def finish(self, _context, job):
@@ -71,16 +62,6 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
                              data.stipple.frame_duration, of_models=True)
         sync.write_shown(data)
         self.report({'INFO'}, f"Budgets of {count} files in '{folder}'")
-
-
-def _rename(folder, wanted):
-    """Gives a folder its final name; one that is there stays, as undo goes back to it."""
-    target, number = wanted, 0
-    while os.path.exists(target):
-        number += 1
-        target = f'{wanted}.{number:03d}'
-    os.rename(folder, target)
-    return target
 
 
 classes = (STIPPLE_OT_prepare_budgets,)

@@ -45,7 +45,7 @@ class OneFile:
     def __init__(self, context, path, options):
         render = context.scene.render
         self._native = sources.context()
-        self._writer = binding.series_writer.SeriesWriter.create(self._native, path, render.fps / render.fps_base,
+        self._writer = binding.series_file.SeriesWriter.create(self._native, path, render.fps / render.fps_base,
                                                                  **options)
 
     def add_nothing(self, number):

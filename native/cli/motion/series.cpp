@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -12,6 +13,8 @@
 namespace stipple::cli {
 
 namespace {
+
+constexpr char kNumber = '#';
 
 struct Arguments {
   std::vector<std::string> files;  ///< the last one is written
@@ -58,11 +61,66 @@ Motion motionOf(const Context& context, const std::string& path, const Arguments
   return motion;
 }
 
+StippleCloudSaveOptions saveOptions(const Arguments& arguments) {
+  StippleCloudSaveOptions options;
+  stipple_cloud_save_options_init(&options);
+  options.sh_degree_limit = arguments.degree;
+  options.half = arguments.half ? 1 : 0;
+  if (!arguments.frame.empty()) options.frame = frameOfName(arguments.frame);
+  return options;
+}
+
+void say(const Arguments& arguments, uint64_t frames, uint64_t splats) {
+  Report report;
+  report.add("frames", frames);
+  report.add("splats", splats);
+  report.print(arguments.json);
+}
+
+uint64_t countOf(const Cloud& cloud) {
+  auto info = sized<StippleCloudInfo>();
+  check(stipple_cloud_info(cloud.get(), &info));
+  return info.count;
+}
+
+/// A file with splats at times becomes a file for each. In: out, with a run of '#' in its name.
+void splitSeries(const Context& context, const Arguments& arguments, const std::string& out) {
+  const size_t begin = out.find(kNumber, out.find_last_of('/') + 1);
+  const size_t end = std::min(out.find_first_not_of(kNumber, begin), out.size());
+  if (out.find(kNumber, end) != std::string::npos) {
+    throw Failure("'" + out + "' has two places for a number; files are told apart by one");
+  }
+  if (arguments.files.size() != 2 || arguments.anchors != 0) {
+    throw Failure("'" + out + "' is the name of many files, which one file of USD is split into");
+  }
+  const auto reader = make<SeriesReader>(stipple_series_reader_create, context.get(),
+                                         arguments.files.front().c_str());
+  auto info = sized<StippleSeriesInfo>();
+  check(stipple_series_reader_info(reader.get(), &info));
+  const StippleCloudSaveOptions options = saveOptions(arguments);
+  const uint64_t count = std::max<uint64_t>(info.frame_count, 1);
+  uint64_t splats = 0;
+  for (uint64_t i = 0; i < count; ++i) {
+    double frame = 0;
+    const auto cloud = make<Cloud>(stipple_series_reader_read, reader.get(), i, &frame);
+    const std::string number = std::to_string(arguments.first + static_cast<int64_t>(i));
+    const std::string zeros(end - begin - std::min(number.size(), end - begin), '0');
+    const std::string path = out.substr(0, begin) + zeros + number + out.substr(end);
+    check(stipple_cloud_save(cloud.get(), path.c_str(), &options));
+    splats += countOf(cloud);
+  }
+  say(arguments, count, splats);
+}
+
 void writeSeries(const Context& context, const Arguments& arguments) {
   if (arguments.files.size() < 2) {
     throw Failure("a series needs files to read, or a model that moves, and a file to write");
   }
   const std::string& out = arguments.files.back();
+  if (out.find(kNumber, out.find_last_of('/') + 1) != std::string::npos) {
+    splitSeries(context, arguments, out);
+    return;
+  }
   const std::vector<std::string> files(arguments.files.begin(), arguments.files.end() - 1);
   const bool of_model = hasModelExtension(files.front());
   if (of_model && files.size() > 1) {
@@ -73,11 +131,7 @@ void writeSeries(const Context& context, const Arguments& arguments) {
   }
   Motion motion;
   if (of_model) motion = motionOf(context, files.front(), arguments);
-  StippleCloudSaveOptions options;
-  stipple_cloud_save_options_init(&options);
-  options.sh_degree_limit = arguments.degree;
-  options.half = arguments.half ? 1 : 0;
-  if (!arguments.frame.empty()) options.frame = frameOfName(arguments.frame);
+  const StippleCloudSaveOptions options = saveOptions(arguments);
   const auto writer = make<SeriesWriter>(stipple_series_writer_create, context.get(), out.c_str(),
                                          arguments.rate, &options);
   const uint64_t count = of_model ? motion.count : files.size();
@@ -92,15 +146,10 @@ void writeSeries(const Context& context, const Arguments& arguments) {
     }
     check(stipple_series_writer_add(
         writer.get(), cloud.get(), static_cast<double>(arguments.first + static_cast<int64_t>(i))));
-    auto info = sized<StippleCloudInfo>();
-    check(stipple_cloud_info(cloud.get(), &info));
-    splats += info.count;
+    splats += countOf(cloud);
   }
   check(stipple_series_writer_finish(writer.get()));
-  Report report;
-  report.add("frames", count);
-  report.add("splats", splats);
-  report.print(arguments.json);
+  say(arguments, count, splats);
 }
 
 }  // namespace
@@ -108,11 +157,14 @@ void writeSeries(const Context& context, const Arguments& arguments) {
 void addSeries(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
-      "series", "Splats of several frames to one file that plays (USD with time samples)");
+      "series",
+      "Splats of several frames to one file that plays (USD with time samples), and back");
   command
-      ->add_option("files", arguments->files,
-                   "Splat files, a frame each in their order, or a model of splats that move "
-                   "(.stipple.safetensors); then the file to write (.usda, .usd, .usdz)")
+      ->add_option(
+          "files", arguments->files,
+          "Splat files, a frame each in their order, or a model of splats that move "
+          "(.stipple.safetensors); then the file to write (.usda, .usd, .usdz). Or one such "
+          "file, and what a file of each frame is named, with # for digits: walk_####.ply")
       ->required();
   command->add_option("--frame-rate", arguments->rate, "Frames per second")->capture_default_str();
   command->add_option("--first", arguments->first, "Number of the first frame")

@@ -313,6 +313,26 @@ StippleStatus stipple_series_writer_add(StippleSeriesWriter* writer, const Stipp
 /* Errors: INVALID_ARGUMENT where no cloud had a splat, or where it was called before; IO. */
 StippleStatus stipple_series_writer_finish(StippleSeriesWriter* writer);
 
+/* Reads splats at times out of one file of such a format. All of its numbers are in memory until the reader is freed.
+ * Threads: one call at a time for each reader. */
+typedef struct StippleSeriesReader StippleSeriesReader;
+typedef struct StippleSeriesInfo {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t frame_count;      /* times at which splats, or what places and hides them, have values; 0: it stands still */
+  double frames_per_second;  /* > 0 */
+} StippleSeriesInfo;
+/* Errors: as of stipple_cloud_load; UNSUPPORTED for files of other formats. */
+StippleStatus stipple_series_reader_create(StippleContext* context, const char* path_utf8,
+                                           StippleSeriesReader** reader);
+void stipple_series_reader_free(StippleSeriesReader* reader);
+StippleStatus stipple_series_reader_info(const StippleSeriesReader* reader, StippleSeriesInfo* info);
+/* In: index, below frame_count, or 0. Out: frame, the number that the file has for this time; cloud, which may be empty.
+ * Between its own times an attribute stays as it was. A file that stands still has what stipple_cloud_load reads, at 0.
+ * Errors: INVALID_ARGUMENT, and those of stipple_cloud_load. */
+StippleStatus stipple_series_reader_read(StippleSeriesReader* reader, uint64_t index, double* frame,
+                                         StippleCloud** cloud);
+
 /* One format of splat files. The texts live as long as the library. */
 typedef struct StippleFormatInfo {
   uint32_t struct_size;

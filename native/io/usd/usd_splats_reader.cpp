@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -131,6 +134,7 @@ class Part {
   size_t count_ = 0;
 };
 
+/// What a stage draws at its time; without splats, where it draws none.
 SplatCloud splatsOf(UsdStage& stage, const std::string& path, uint64_t file_bytes,
                     Progress* progress) {
   const UsdLayer& layer = stage.layer();
@@ -167,30 +171,17 @@ SplatCloud splatsOf(UsdStage& stage, const std::string& path, uint64_t file_byte
                                         "filters or frames; one of each is needed");
     }
   });
-  if (parts.empty()) {
-    fail(ErrorCode::kFormat, path + " draws no splats: it has no prim of type " + kUsdSplats +
-                                 " that is active, visible and not empty");
-  }
   advance(progress, 0.9, kStage);
+  if (parts.empty()) {
+    SplatCloud nothing;
+    nothing.frame = frame;
+    return nothing;
+  }
   return parts.size() == 1 ? std::move(parts.front()) : joined(parts);
 }
 
 std::string textOf(const std::vector<uint8_t>& bytes) {
   return std::string(bytes.begin(), bytes.end());
-}
-
-SplatCloud readPackage(const std::string& path, Progress* progress) {
-  const InputFile file(path);
-  const ZipReader package(file);
-  const std::string root = package.firstName();
-  const std::string folder = root.substr(0, root.find_last_of('/') + 1);
-  const auto load = [&](const std::string& name) {
-    std::string text = textOf(package.read(name, kMaxLayerBytes));
-    requireText(text, path + ": " + name);
-    return text;
-  };
-  UsdStage stage(path, load(root), [&](const std::string& name) { return load(folder + name); });
-  return splatsOf(stage, path, file.size(), progress);
 }
 
 }  // namespace
@@ -203,19 +194,73 @@ bool startsAsUsdz(const SplatFileStart& start) {
   return start.name.ends_with(".usdz") && start.bytes.starts_with(kZipHead);
 }
 
+struct UsdSplatsReader::Open {
+  explicit Open(const std::string& of_path) : path(of_path), file(of_path) {
+    if (lowerExtension(path) == ".usdz") package.emplace(file);
+    std::string root, folder;
+    if (package) {
+      root = package->firstName();
+      folder = root.substr(0, root.find_last_of('/') + 1);
+    }
+    stage = std::make_unique<UsdStage>(
+        path, package ? ofPackage(root) : ofFolder(path), [this, folder](const std::string& name) {
+          return package ? ofPackage(folder + name)
+                         : ofFolder((fs::path(path).parent_path() / name).string());
+        });
+  }
+
+  std::string ofPackage(const std::string& name) const {
+    std::string text = textOf(package->read(name, kMaxLayerBytes));
+    requireText(text, path + ": " + name);
+    return text;
+  }
+
+  static std::string ofFolder(const std::string& name) {
+    std::string text = readTextFile(name, kMaxLayerBytes);
+    requireText(text, name);
+    return text;
+  }
+
+  std::string path;
+  InputFile file;
+  std::optional<ZipReader> package;  ///< nothing: a layer
+  std::unique_ptr<UsdStage> stage;
+};
+
+UsdSplatsReader::UsdSplatsReader(const std::string& path) : open_(std::make_unique<Open>(path)) {
+  const std::set<double> times = open_->stage->timesOf(kUsdSplats);
+  times_.assign(times.begin(), times.end());
+}
+
+UsdSplatsReader::~UsdSplatsReader() = default;
+
+double UsdSplatsReader::framesPerSecond() const {
+  constexpr double kFallback = 24.0;
+  const UsdLayer& layer = open_->stage->layer();
+  for (const std::optional<double>& rate : {layer.time_codes_per_second, layer.frames_per_second}) {
+    if (rate && *rate > 0 && std::isfinite(*rate)) return *rate;
+  }
+  return kFallback;
+}
+
+SplatCloud UsdSplatsReader::still(Progress* progress) {
+  open_->stage->setTime(std::nullopt);
+  SplatCloud cloud = splatsOf(*open_->stage, open_->path, open_->file.size(), progress);
+  if (cloud.size() == 0) {
+    fail(ErrorCode::kFormat, open_->path + " draws no splats: it has no prim of type " +
+                                 kUsdSplats + " that is active, visible and not empty");
+  }
+  return cloud;
+}
+
+SplatCloud UsdSplatsReader::at(double time) {
+  open_->stage->setTime(time);
+  return splatsOf(*open_->stage, open_->path, open_->file.size(), nullptr);
+}
+
 SplatCloud readUsdSplats(const std::string& path, Progress* progress) {
   advance(progress, 0.0, kStage);
-  if (lowerExtension(path) == ".usdz") return readPackage(path, progress);
-  const uint64_t file_bytes = InputFile(path).size();
-  const auto load = [&](const std::string& file) {
-    std::string text = readTextFile(file, kMaxLayerBytes);
-    requireText(text, file);
-    return text;
-  };
-  UsdStage stage(path, load(path), [&](const std::string& name) {
-    return load((fs::path(path).parent_path() / name).string());
-  });
-  return splatsOf(stage, path, file_bytes, progress);
+  return UsdSplatsReader(path).still(progress);
 }
 
 }  // namespace stipple

@@ -96,9 +96,17 @@ const UsdValue* UsdNode::value(const std::string& attribute) const {
   for (const Opinion& opinion : opinions_) {
     const auto found = opinion.prim->attributes.find(attribute);
     if (found == opinion.prim->attributes.end()) continue;
-    if (const UsdValue* value = found->second.first()) return value;
+    if (const UsdValue* value = found->second.at(time_)) return value;
   }
   return nullptr;
+}
+
+void UsdNode::addTimes(std::set<double>& times) const {
+  for (const Opinion& opinion : opinions_) {
+    for (const auto& [name, attribute] : opinion.prim->attributes) {
+      for (const auto& [time, value] : attribute.samples) times.insert(time);
+    }
+  }
 }
 
 std::string UsdNode::custom(const std::string& key) const {
@@ -109,7 +117,7 @@ std::string UsdNode::custom(const std::string& key) const {
   return "";
 }
 
-bool UsdNode::isDrawn() const {
+bool UsdNode::isThere() const {
   const auto strongest = [&](const auto& says) {
     return std::find_if(opinions_.begin(), opinions_.end(),
                         [&](const Opinion& opinion) { return says(*opinion.prim); });
@@ -119,12 +127,15 @@ bool UsdNode::isDrawn() const {
   // A class that is referred to is content of the definition that refers to it.
   const auto defined =
       strongest([](const UsdPrim& prim) { return prim.is_defined || prim.is_class; });
-  if (defined == opinions_.end() || defined->prim->is_class) return false;
+  return defined != opinions_.end() && !defined->prim->is_class;
+}
+
+bool UsdNode::isDrawn() const {
   const auto word = [&](const char* attribute) -> std::string_view {
     const UsdValue* said = value(attribute);
     return said == nullptr || said->words.empty() ? "" : std::string_view(said->words.front());
   };
-  return word("visibility") != "invisible" && word("purpose") != "proxy" &&
+  return isThere() && word("visibility") != "invisible" && word("purpose") != "proxy" &&
          word("purpose") != "guide";
 }
 
@@ -235,46 +246,77 @@ void UsdStage::add(std::vector<UsdNode::Opinion>& opinions, const UsdNode::Opini
   }
 }
 
-UsdNode UsdStage::childOf(const UsdNode& parent, const std::string& name) {
+UsdNode UsdStage::root() const {
   UsdNode node;
-  for (const UsdNode::Opinion& opinion : parent.opinions_) {
-    if (const UsdPrim* prim = opinion.prim->child(name)) {
-      add(node.opinions_, {opinion.layer, prim, opinion.folder}, 0);
+  node.time_ = time_;
+  return node;
+}
+
+std::vector<UsdNode> UsdStage::childrenOf(const UsdNode& parent) {
+  std::vector<UsdNode> children;
+  // What it has are prototypes, which are drawn at its points alone.
+  if (parent.type() == kPointInstancer) return children;
+  std::set<std::string> seen;
+  for (const UsdNode::Opinion& strongest : parent.opinions_) {
+    for (const auto& child : strongest.prim->children) {
+      if (!seen.insert(child->name).second) continue;
+      UsdNode& node = children.emplace_back(root());
+      for (const UsdNode::Opinion& opinion : parent.opinions_) {
+        if (const UsdPrim* prim = opinion.prim->child(child->name)) {
+          add(node.opinions_, {opinion.layer, prim, opinion.folder}, 0);
+        }
+      }
     }
   }
-  return node;
+  return children;
+}
+
+void UsdStage::requireBounds(int depth) {
+  if (depth > kMaxDepth || ++visited_ > kMaxPrims) {
+    fail(ErrorCode::kFormat, name_ + " has more than " + std::to_string(kMaxPrims) +
+                                 " prims, or prims in each other without end");
+  }
 }
 
 void UsdStage::walk(
     const UsdNode& node, const std::string& path, const Mat4d& matrix, int depth,
     const std::function<void(const UsdNode&, const std::string&, const Mat4d&)>& visit_one) {
-  if (depth > kMaxDepth || ++visited_ > kMaxPrims) {
-    fail(ErrorCode::kFormat, name_ + " has more than " + std::to_string(kMaxPrims) +
-                                 " prims, or prims in each other without end");
-  }
+  requireBounds(depth);
   if (!path.empty()) visit_one(node, path, matrix);
-  // What it has are prototypes, which are drawn at its points alone.
-  if (node.type() == kPointInstancer) return;
-  std::set<std::string> seen;
-  for (const UsdNode::Opinion& opinion : node.opinions_) {
-    for (const auto& prim : opinion.prim->children) {
-      if (!seen.insert(prim->name).second) continue;
-      const UsdNode child = childOf(node, prim->name);
-      if (!child.isDrawn()) continue;
-      const std::string child_path = path + "/" + prim->name;
-      const Mat4d own = child.matrix(name_ + ": " + child_path);
-      walk(child, child_path, child.leavesParent() ? own : Mat4d(matrix * own), depth + 1,
-           visit_one);
-    }
+  for (const UsdNode& child : childrenOf(node)) {
+    if (!child.isDrawn()) continue;
+    const std::string child_path = path + "/" + child.name();
+    const Mat4d own = child.matrix(name_ + ": " + child_path);
+    walk(child, child_path, child.leavesParent() ? own : Mat4d(matrix * own), depth + 1, visit_one);
   }
 }
 
 void UsdStage::visit(
     const std::function<void(const UsdNode&, const std::string&, const Mat4d&)>& visit_one) {
   visited_ = 0;
-  UsdNode root;
-  addLayer(root.opinions_, root_, "", 0);
-  walk(root, "", Mat4d::Identity(), 0, visit_one);
+  UsdNode top = root();
+  addLayer(top.opinions_, root_, "", 0);
+  walk(top, "", Mat4d::Identity(), 0, visit_one);
+}
+
+bool UsdStage::collectTimes(const UsdNode& node, const std::string& type, int depth,
+                            std::set<double>& times) {
+  requireBounds(depth);
+  bool holds = node.type() == type;
+  for (const UsdNode& child : childrenOf(node)) {
+    if (child.isThere() && collectTimes(child, type, depth + 1, times)) holds = true;
+  }
+  if (holds) node.addTimes(times);
+  return holds;
+}
+
+std::set<double> UsdStage::timesOf(const std::string& type) {
+  visited_ = 0;
+  UsdNode top = root();
+  addLayer(top.opinions_, root_, "", 0);
+  std::set<double> times;
+  collectTimes(top, type, 0, times);
+  return times;
 }
 
 }  // namespace stipple

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,11 +19,14 @@ class UsdNode {
  public:
   std::string type() const;
   const std::string& name() const { return opinions_.front().prim->name; }
-  /// The strongest value of an attribute; at several times, that of the first. Null for none.
+  /// The strongest value of an attribute at the stage's time (UsdStage::setTime). Null for none.
   const UsdValue* value(const std::string& attribute) const;
+  /// Adds the times at which its attributes have values.
+  void addTimes(std::set<double>& times) const;
   /// A string of customData, or empty.
   std::string custom(const std::string& key) const;
-  bool isDrawn() const;  ///< defined, active, no class, not invisible, no proxy and no guide
+  bool isThere() const;  ///< defined, active and no class
+  bool isDrawn() const;  ///< there, not invisible, no proxy and no guide
   /// Where the prim's transformation leads, columns as in all of Stipple. In: path, in messages.
   /// Errors: kFormat for operations without a value.
   Mat4d matrix(const std::string& path) const;
@@ -36,6 +40,7 @@ class UsdNode {
     std::string folder;  ///< of the layer, relative to the stage's; with a '/' behind it, or empty
   };
   std::vector<Opinion> opinions_;
+  std::optional<double> time_;
 };
 
 /// A layer with the layers and prims that it refers to.
@@ -49,6 +54,12 @@ class UsdStage {
   UsdStage(std::string name, std::string text, Loader loader);
 
   const UsdLayer& layer() const { return *root_; }
+  /// When values are asked for from now on; nothing, as at first: the ones without a time, or of
+  /// their first.
+  void setTime(std::optional<double> time) { time_ = time; }
+  /// The times at which prims of a type, drawn or hidden, or what they lie in have values. In:
+  /// type.
+  std::set<double> timesOf(const std::string& type);
   /// Calls for every prim that is drawn, parents before children, until all have been seen. In:
   /// visit, given the prim, its path and where the stage's root has it.
   void visit(const std::function<void(const UsdNode& node, const std::string& path,
@@ -59,7 +70,12 @@ class UsdStage {
   void addLayer(std::vector<UsdNode::Opinion>& opinions, const UsdLayer* layer,
                 const std::string& folder, int depth);
   const UsdLayer* load(const std::string& path);
-  UsdNode childOf(const UsdNode& parent, const std::string& name);
+  UsdNode root() const;
+  /// In the order of the strongest opinions.
+  std::vector<UsdNode> childrenOf(const UsdNode& parent);
+  void requireBounds(int depth);
+  bool collectTimes(const UsdNode& node, const std::string& type, int depth,
+                    std::set<double>& times);
   void walk(const UsdNode& node, const std::string& path, const Mat4d& matrix, int depth,
             const std::function<void(const UsdNode&, const std::string&, const Mat4d&)>& visit_one);
 
@@ -68,6 +84,7 @@ class UsdStage {
   std::map<std::string, std::unique_ptr<UsdLayer>> layers_;  ///< by path; the stage's own: ""
   const UsdLayer* root_;
   size_t visited_ = 0;
+  std::optional<double> time_;
 };
 
 }  // namespace stipple

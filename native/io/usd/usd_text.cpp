@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <utility>
 
 #include "base/error.h"
@@ -402,6 +403,10 @@ class Parser {
         layer.default_prim = takeString();
       } else if (word == "metersPerUnit") {
         layer.metres_per_unit = takeNumber<double>();
+      } else if (word == "timeCodesPerSecond") {
+        layer.time_codes_per_second = takeNumber<double>();
+      } else if (word == "framesPerSecond") {
+        layer.frames_per_second = takeNumber<double>();
       } else if (word == "subLayers") {
         takeList([&] {
           if (next() != '@') failHere("the path of a layer");
@@ -460,9 +465,15 @@ class Parser {
 
 }  // namespace
 
-const UsdValue* UsdAttribute::first() const {
-  if (value) return &*value;
-  return samples.empty() ? nullptr : &samples.begin()->second;
+const UsdValue* UsdAttribute::at(std::optional<double> time) const {
+  if (value && (!time || samples.empty())) return &*value;
+  if (samples.empty()) return nullptr;
+  auto found = samples.begin();
+  if (time) {
+    const auto after = samples.upper_bound(*time);
+    if (after != samples.begin()) found = std::prev(after);
+  }
+  return &found->second;
 }
 
 const UsdPrim* UsdPrim::child(std::string_view of_name) const {

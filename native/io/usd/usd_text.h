@@ -22,8 +22,9 @@ struct UsdAttribute {
   std::optional<UsdValue> value;
   std::map<double, UsdValue> samples;
 
-  /// The value, or that of the first time; null where there is neither.
-  const UsdValue* first() const;
+  /// The value, or that of the first time; null where there is neither. In: time, if one is asked
+  /// for: then the value of the last time up to it, or of the first, or the one without times.
+  const UsdValue* at(std::optional<double> time) const;
 };
 
 /// Where else a prim's content comes from: references, payloads and classes that it inherits.
@@ -50,6 +51,7 @@ struct UsdLayer {
   std::string up_axis;  ///< "Y", "Z"; empty where it is not said
   std::string default_prim;
   std::optional<double> metres_per_unit;
+  std::optional<double> time_codes_per_second, frames_per_second;
   std::vector<std::string> sublayers;  ///< relative paths, the strongest first
   UsdPrim root;                        ///< without a name; its children are the layer's prims
 };

@@ -112,5 +112,74 @@ TEST_F(Formats, LevelsAreSavedAndTheFinestIsRead) {
   for (StippleCloud* cloud : {fine, coarse, back}) stipple_cloud_free(cloud);
 }
 
+TEST_F(Formats, HoldSplatsAtTimesAndGiveThemBack) {
+  const std::string file = path("walk.usdz");
+  StippleSeriesWriter* writer = nullptr;
+  STIPPLE_ASSERT_OK(stipple_series_writer_create(context_, file.c_str(), 12.5, nullptr, &writer));
+  const auto red = [](const StippleCloud* cloud) {
+    float sh[3] = {};
+    auto buffers = sized<StippleCloudBuffers>();
+    buffers.capacity = 1;
+    buffers.sh = sh;
+    STIPPLE_EXPECT_OK(stipple_cloud_read(cloud, &buffers));
+    return sh[0];
+  };
+  float reds[2] = {};
+  for (const size_t i : {0u, 1u}) {
+    StippleCloud* cloud = oneSplat(0.25f + 0.5f * static_cast<float>(i), 0, 0);
+    reds[i] = red(cloud);
+    STIPPLE_EXPECT_OK(stipple_series_writer_add(writer, cloud, 3.0 + static_cast<double>(i)));
+    stipple_cloud_free(cloud);
+  }
+  EXPECT_NE(reds[0], reds[1]);
+  STIPPLE_ASSERT_OK(stipple_series_writer_finish(writer));
+  stipple_series_writer_free(writer);
+  StippleSeriesReader* reader = nullptr;
+  STIPPLE_ASSERT_OK(stipple_series_reader_create(context_, file.c_str(), &reader));
+  auto info = sized<StippleSeriesInfo>();
+  STIPPLE_ASSERT_OK(stipple_series_reader_info(reader, &info));
+  EXPECT_EQ(info.frame_count, 2u);
+  EXPECT_EQ(info.frames_per_second, 12.5);
+  double frame = 0;
+  StippleCloud* cloud = nullptr;
+  for (const uint64_t index : {1u, 0u}) {
+    STIPPLE_ASSERT_OK(stipple_series_reader_read(reader, index, &frame, &cloud));
+    EXPECT_EQ(frame, 3.0 + static_cast<double>(index));
+    EXPECT_EQ(red(cloud), reds[index]);
+    stipple_cloud_free(cloud);
+  }
+  EXPECT_EQ(stipple_series_reader_read(reader, 2, &frame, &cloud), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(stipple_series_reader_read(reader, 0, nullptr, &cloud), STIPPLE_ERROR_INVALID_ARGUMENT);
+  stipple_series_reader_free(reader);
+  stipple_series_reader_free(nullptr);
+  EXPECT_EQ(stipple_series_reader_create(context_, path("gone.usda").c_str(), &reader),
+            STIPPLE_ERROR_IO);
+}
+
+TEST_F(Formats, ThatHoldNoTimesAreNoSeriesAndAStillFileIsOneFrame) {
+  StippleCloud* cloud = oneSplat(5, 0, 0);
+  for (const char* name : {"still.ply", "still.usda"}) {
+    STIPPLE_ASSERT_OK(stipple_cloud_save(cloud, path(name).c_str(), nullptr));
+  }
+  stipple_cloud_free(cloud);
+  StippleSeriesReader* reader = nullptr;
+  EXPECT_EQ(stipple_series_reader_create(context_, path("still.ply").c_str(), &reader),
+            STIPPLE_ERROR_UNSUPPORTED);
+  EXPECT_NE(std::string(stipple_last_error_message()).find("still.ply"), std::string::npos);
+  STIPPLE_ASSERT_OK(stipple_series_reader_create(context_, path("still.usda").c_str(), &reader));
+  auto info = sized<StippleSeriesInfo>();
+  STIPPLE_ASSERT_OK(stipple_series_reader_info(reader, &info));
+  EXPECT_EQ(info.frame_count, 0u);
+  double frame = 9;
+  STIPPLE_ASSERT_OK(stipple_series_reader_read(reader, 0, &frame, &cloud));
+  EXPECT_EQ(frame, 0.0);
+  auto found = sized<StippleCloudInfo>();
+  STIPPLE_ASSERT_OK(stipple_cloud_info(cloud, &found));
+  EXPECT_EQ(found.count, 1u);
+  stipple_cloud_free(cloud);
+  EXPECT_EQ(stipple_series_reader_read(reader, 1, &frame, &cloud), STIPPLE_ERROR_INVALID_ARGUMENT);
+  stipple_series_reader_free(reader);
+}
+
 }  // namespace
 }  // namespace stipple::test

@@ -11,6 +11,7 @@
 #include "io/bytes/zip_file.h"
 #include "io/splats/splat_file.h"
 #include "io/usd/usd_series_writer.h"
+#include "io/usd/usd_splats.h"
 #include "io/usd/usd_text.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
@@ -333,6 +334,62 @@ TEST_F(UsdSeries, HasEveryFrameAtItsTime) {
   EXPECT_EQ(prim.attributes.at("extent").samples.at(12).floats.size(), 6u);
   // As a file of splats it shows its first frame.
   EXPECT_TRUE(readSplatFile(path("a.usda")).positions == clouds[0].positions);
+}
+
+TEST_F(UsdSeries, ComesBackFrameByFrame) {
+  const size_t counts[] = {7, 0, 9000};
+  for (const char* name : {"a.usda", "a.usdz"}) {
+    UsdSeriesWriter writer(path(name), 30, {});
+    std::vector<SplatCloud> clouds;
+    for (size_t i = 0; i < 3; ++i) {
+      clouds.push_back(randomCloud(counts[i], 1, static_cast<unsigned>(i)));
+      if (i == 1) clouds.back() = SplatCloud();
+      clouds.back().frame = Frame::kRUB;
+      writer.add(clouds.back(), 10 + 2.5 * static_cast<double>(i));
+    }
+    writer.finish();
+    UsdSplatsReader reader(path(name));
+    EXPECT_EQ(reader.times(), (std::vector<double>{10, 12.5, 15})) << name;
+    EXPECT_EQ(reader.framesPerSecond(), 30);
+    for (const size_t i : {2u, 0u, 1u}) {
+      const SplatCloud back = reader.at(reader.times()[i]);
+      EXPECT_EQ(back.frame, Frame::kRUB);
+      EXPECT_TRUE(back.positions == clouds[i].positions) << name << " " << i;
+      EXPECT_TRUE(back.rotations == clouds[i].rotations) << name << " " << i;
+      EXPECT_TRUE(back.sh == clouds[i].sh) << name << " " << i;
+    }
+    EXPECT_TRUE(reader.still(nullptr).positions == clouds[0].positions);
+  }
+}
+
+TEST_F(UsdSeries, ShowsWhatMovesAndHidesSplatsAtEachTime) {
+  // Another program's layer: values at times of the prim, of what it lies in, and of what has no
+  // splats.
+  const std::string text = layerOf(
+      "framesPerSecond = 25",
+      "def Xform \"Moved\"\n{\n"
+      "    double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 3: (10, 0, 0), 4: None }\n"
+      "    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n"
+      "    token visibility.timeSamples = { 0: \"inherited\", 5: \"invisible\" }\n",
+      "}\ndef Camera \"C\"\n{\n    float focalLength.timeSamples = { 7: 50 }\n}\n",
+      "    float[] opacities.timeSamples = { 2: [0.5, 0.125] }\n");
+  UsdSplatsReader reader(store("moved.usda", text));
+  EXPECT_EQ(reader.times(), (std::vector<double>{0, 1, 2, 3, 5}));
+  EXPECT_EQ(reader.framesPerSecond(), 25);
+  expectPositions(reader.at(0), {1, 2, 3, 4, 5, 6});
+  expectPositions(reader.at(2), {1, 2, 3, 4, 5, 6});
+  expectPositions(reader.at(3), {11, 2, 3, 14, 5, 6});
+  EXPECT_EQ(reader.at(3).opacities, (std::vector<float>{0.5f, 0.125f}));
+  EXPECT_EQ(reader.at(5).size(), 0u);
+  // Without a time the value that has none is the one.
+  EXPECT_EQ(reader.still(nullptr).opacities, (std::vector<float>{0.25f, 1.0f}));
+}
+
+TEST_F(UsdSeries, StandsStillWithoutTimes) {
+  UsdSplatsReader reader(store("still.usda", layerOf("upAxis = \"Y\"")));
+  EXPECT_TRUE(reader.times().empty());
+  EXPECT_EQ(reader.framesPerSecond(), 24);
+  EXPECT_EQ(reader.still(nullptr).size(), 2u);
 }
 
 TEST_F(UsdSeries, LiesInPackagesToo) {
