@@ -32,6 +32,12 @@ def work():
     for form in ('ply', 'spz', 'sog', 'glb', 'usdz'):
         assert bpy.ops.stipple.splats_export(filepath=file(f'out.{form}')) == {'FINISHED'}
     assert bpy.ops.stipple.splats_to_volume(filepath=file('out.vdb'), resolution=24) == {'FINISHED'}
+    # Blender reads it with an OpenVDB of its own.
+    volume = bpy.data.volumes.new('Read')
+    volume.filepath = file('out.vdb')
+    assert volume.grids.load(), volume.grids.error_message
+    assert {'density', 'color'} <= {grid.name for grid in volume.grids}
+    assert volume.grids['density'].data_type == 'FLOAT'
     scene = bpy.context.scene
     camera = bpy.data.objects.new('Camera', bpy.data.cameras.new('Camera'))
     camera.location = (0, 0, 9)
