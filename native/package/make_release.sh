@@ -7,12 +7,13 @@
 #   bash native/package/make_release.sh --macos-arm64, --macos-x64 or --linux-arm64
 #                                                   makes the one for these and looks at it; qemu runs that of Linux
 #   bash native/package/make_release.sh --twice     after any: makes it again from a copy of the sources in another
-#                                                   folder, without a compiler's cache, and compares the bytes
+#                                                   folder, with all that is linked in and without a compiler's cache,
+#                                                   and compares the bytes
 # Takes Debian 12. STIPPLE_JOBS: compilers at a time.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 python=/usr/bin/python3
-folder=$PWD/build/package
+folder=build/package
 parts=$folder preset=portable libraries=lib platform=linux-x64 dependencies=--package
 parts_option=() targets=(all) twice=
 for option; do
@@ -33,9 +34,10 @@ for option; do
 done
 
 make_zip() { # FOLDER of the sources
-  cmake -S "$1" --preset $preset -DSTIPPLE_PACKAGE_PARTS="$parts" >/dev/null
+  bash "$1/native/package/make_parts.sh" "${parts_option[@]}"
+  cmake -S "$1" --preset $preset -DSTIPPLE_PACKAGE_PARTS="$1/$parts" >/dev/null
   cmake --build "$1/build/$preset" --parallel "$jobs" --target "${targets[@]}"
-  $python native/package/licences.py "$folder" "$1/build/licences" --platform $platform
+  $python "$1/native/package/licences.py" "$1/$folder" "$1/build/licences" --platform $platform
   $python "$1/addon/make_zip.py" --libraries "$1/build/$preset/$libraries" --licences "$1/build/licences" \
     --self-contained --platform $platform --output "$1/build/$name"
 }
@@ -49,7 +51,6 @@ fi
 bash native/install_dependencies.sh $dependencies
 jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
 name=$($python -c "import sys; sys.path.insert(0, 'addon'); import make_zip; print(make_zip.split_name('$platform'))")
-bash native/package/make_parts.sh "${parts_option[@]}"
 make_zip "$PWD"
 zip=build/$name
 ls -l "build/$preset/$libraries"
@@ -62,11 +63,13 @@ esac
 env "$variable=$PWD/$zip" $python -m pytest -q -rs -p no:cacheprovider "${tests[@]}"
 
 if [ -n "$twice" ]; then
-  copy=build/second
+  # Only what was fetched is handed over.
+  copy=$PWD/build/second
   rm -rf "$copy"
-  mkdir -p "$copy"
+  mkdir -p "$copy/$folder"
   git ls-files -z | xargs -0 cp --parents -t "$copy"
-  CCACHE_DISABLE=1 STIPPLE_ZIG=$parts/bin make_zip "$PWD/$copy"
+  cp -r $folder/downloads "$copy/$folder"
+  CCACHE_DISABLE=1 ZIG_GLOBAL_CACHE_DIR=$copy/build/zig-cache make_zip "$copy"
   cmp "$zip" "$copy/build/$name"
   echo "Made twice, with the same bytes: $(sha256sum < "$zip" | cut -c 1-64)"
 fi
