@@ -28,6 +28,7 @@ enum class RandomUse : uint32_t {
   kViewRig = 10,
   kViewOrder = 11,
   kThinning = 12,
+  kDropout = 14,
   kSplitOffset = 20,
   kDensifyChoice = 23,
   kRelocation = 24,

@@ -112,6 +112,8 @@ const char* wordsOf(ControlRole role) {
       return "how strong a pull must be";
     case ControlRole::kTime:
       return "how time is stretched";
+    case ControlRole::kDropout:
+      return "which splats an image leaves out";
   }
   return "";
 }

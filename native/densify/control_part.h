@@ -74,9 +74,10 @@ enum class ControlRole : uint32_t {
   kSecondSplit = 1u << 13,       ///< which splats are split after that, children too
   kThreshold = 1u << 14,         ///< how little of a pull is enough to multiply, splat by splat
   kTime = 1u << 15,              ///< how time is stretched, of splats that move
+  kDropout = 1u << 16,           ///< which splats the image of an iteration leaves out
 };
 /// Roles are bits 0 to this, without a gap.
-constexpr uint32_t kControlRoleCount = 16;
+constexpr uint32_t kControlRoleCount = 17;
 using ControlRoles = uint32_t;
 constexpr ControlRoles roles(ControlRole role) {
   return static_cast<ControlRoles>(role);
@@ -165,6 +166,8 @@ class ControlPart : public FitHooks<ControlMoment> {
   virtual bool lowersAt(const ControlMoment& moment) const { return moment.is_event; }
   /// kOpacity: adds writes of logits, and changes those of appended rows.
   virtual void lowerOpacities(const ControlMoment&, const RawSplats&, SplatEdit&) {}
+  /// kOpacity: steps for which splats look like fog after it has acted now; 0: they do not.
+  virtual uint64_t foggySteps(const ControlMoment&) const { return 0; }
 
   // ---- its own numbers ---------------------------------------------------------------------------
   /// After every edit: arrays per splat follow, and windows begin anew.

@@ -99,6 +99,10 @@ class DensityControl final : public Strategy {
     return request;
   }
 
+  std::vector<float> opacityFactors(const FitMoment& given, size_t count) const override {
+    const ControlPart* part = owner(ControlRole::kDropout);
+    return part ? part->opacityFactors(at(given), count) : std::vector<float>{};
+  }
   bool regularises(const FitMoment& given) const override {
     const ControlPart* part = owner(ControlRole::kRegularisation);
     return part && part->regularises(at(given));
@@ -130,6 +134,10 @@ class DensityControl final : public Strategy {
   bool lowersOpacitiesAt(const FitMoment& given) const override {
     const ControlPart* part = owner(ControlRole::kOpacity);
     return part && part->lowersAt(at(given));
+  }
+  uint64_t foggyStepsAfter(const FitMoment& given) const override {
+    const ControlPart* part = owner(ControlRole::kOpacity);
+    return part ? part->foggySteps(at(given)) : 0;
   }
 
   bool wantsSweep(const FitMoment& given) const override {

@@ -203,6 +203,9 @@ class FitHooks {
   virtual const Parameterisation* parameterisation() const { return nullptr; }
 
   // ---- every iteration -------------------------------------------------------------------------
+  /// What opacities are multiplied by in the image of this iteration, [N] >= 0; empty: nothing is.
+  /// Of parts: kDropout.
+  virtual std::vector<float> opacityFactors(const Moment&, size_t /*count*/) const { return {}; }
   /// Whether loss() has anything to add; where it has, stored values are copied out for it. Of
   /// parts: kRegularisation.
   virtual bool regularises(const Moment&) const { return false; }
@@ -238,6 +241,8 @@ class Strategy : public FitHooks<FitMoment> {
 
   /// Whether the edit of this iteration lowers opacities, for them to come back.
   virtual bool lowersOpacitiesAt(const FitMoment&) const { return false; }
+  /// Steps for which splats look like fog after the edit of this iteration; 0: they do not.
+  virtual uint64_t foggyStepsAfter(const FitMoment&) const { return 0; }
 
   /// Which splats there shall be. The strategy's own arrays per splat follow its answer at once;
   /// whoever called applies it.

@@ -8,6 +8,7 @@
 #include "densify/parts/opacity_correction.h"
 #include "densify/parts/recovery_pruning.h"
 #include "densify/parts/screen_pull.h"
+#include "densify/parts/splat_dropout.h"
 #include "densify/strategies.h"
 #include "densify/strategies/absolute.h"
 #include "densify/strategies/adaptive.h"
@@ -102,6 +103,10 @@ ControlAssembly offsetWarp(StrategySettings& settings) {
   stretch.frames = settings.number("frames", stretch.frames, 1, 1e6);
   stretch.share = settings.number("share", stretch.share, 0.01, 0.99);
   return assemblyOf(makeOffsetWarp(stretch));
+}
+
+ControlAssembly splatDropoutPart(StrategySettings& settings) {
+  return assemblyOf(splatDropout(settings));
 }
 
 ControlAssembly filter3dPart(StrategySettings& settings) {
@@ -202,8 +207,7 @@ const std::vector<StrategyEntry>& partEntries() {
        .bit = 6},
       {.name = "filter_3d",
        .label = "Filter 3D",
-       .summary =
-           "Makes no splat finer than the images can show, so that zooming in stays smooth",
+       .summary = "Makes no splat finer than the images can show, so that zooming in stays smooth",
        .make = filter3dPart,
        .bit = 7},
       {.name = "visibility_weighted_score",
@@ -221,6 +225,11 @@ const std::vector<StrategyEntry>& partEntries() {
        .summary = "Stretches time about each splat's moment, where it is seen and moves most",
        .make = offsetWarp,
        .bit = 10},
+      {.name = "splat_dropout",
+       .label = "Splat Dropout",
+       .summary = "Leaves some splats out of each image: with few views, others come out better",
+       .make = splatDropoutPart,
+       .bit = 11},
       // Further parts go here, each with the next bit.
   };
   return kEntries;

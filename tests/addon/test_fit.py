@@ -189,7 +189,7 @@ def test_lists_strategies_and_parts(context):
     # Files keep a part under its bit: these never change, and no other part gets one of them.
     bits = ('edge_aware_score', 'long_axis_split', 'volume_split', 'recovery_pruning', 'growth_control',
             'multi_step_update', 'opacity_correction', 'filter_3d', 'visibility_weighted_score', 'lifespan_threshold',
-            'offset_warp')
+            'offset_warp', 'splat_dropout')
     assert [parts[name].bit for name in bits] == list(range(len(bits)))
     assert len({entry.bit for entry in parts.values()}) == len(parts) and all(e.bit < 31 for e in parts.values())
     assert all(entry.bit is None for entry in known)

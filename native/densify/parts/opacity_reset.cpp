@@ -5,6 +5,7 @@
 #include "densify/parts/opacity_reset.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace stipple {
@@ -26,6 +27,13 @@ class OpacityReset final : public ControlPart {
     if (!moment.is_learning) return;
     if (isSoftlyDue(moment)) limitOpacities(splats, options_.soft_opacity, edit);
     if (isWhollyDue(moment)) limitOpacities(splats, options_.opacity, edit);
+  }
+  /// Until an opacity that has been limited is a half again, at most.
+  uint64_t foggySteps(const ControlMoment& moment) const override {
+    if (!moment.is_learning || !isWhollyDue(moment)) return 0;
+    const double way = static_cast<double>(rawOpacity(0.5f)) -
+                       static_cast<double>(rawOpacity(static_cast<float>(options_.opacity)));
+    return static_cast<uint64_t>(std::max(0.0, std::ceil(way / LearningRates().logit)));
   }
 
  private:

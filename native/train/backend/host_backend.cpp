@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <utility>
@@ -105,9 +106,21 @@ class HostBackend final : public RenderBackend {
     return static_cast<uint32_t>(targets_.size() - 1);
   }
 
+  void weighOpacities(std::vector<float> factors) override {
+    if (!factors.empty()) requireCount(factors.size(), splatCount(), "opacity factors");
+    for (size_t i = 0; i < factors.size(); ++i) {
+      if (factors[i] >= 0 && std::isfinite(factors[i])) continue;
+      fail(ErrorCode::kInvalidArgument, "the opacity factor of splat " + std::to_string(i) +
+                                            " is " + std::to_string(factors[i]) +
+                                            "; 0 and more is allowed");
+    }
+    factors_ = std::move(factors);
+  }
+
   void forward(const Camera& camera, const RenderOptions& options, Progress* progress) override {
     forget();  // an image that fails half-way is of no splats
     activate();
+    weigh();
     const Lent lent(*this);
     pass_->forward(cloud_, camera, options, progress);
     width_ = camera.width;
@@ -145,6 +158,7 @@ class HostBackend final : public RenderBackend {
         pass_->backward(request, regulariser ? regulariser->transmittanceWeight() : 0.0, progress);
     pass_->swapGradients(by_);
     has_gradients_ = true;
+    if (is_weighed_) weighGradients();
     if (regulariser && regulariser->readsSplats()) {
       summary.regularisation += regulariser->evaluate(cloud_, spansOf(by_));
     }
@@ -260,8 +274,9 @@ class HostBackend final : public RenderBackend {
   }
 
   void changed() {
-    is_activated_ = false;
     forget();
+    is_activated_ = false;
+    factors_.clear();
   }
 
   /// Image and derivatives are of no splats that there are.
@@ -269,6 +284,36 @@ class HostBackend final : public RenderBackend {
     takeBack();
     pass_->forget();
     width_ = height_ = 0;
+    if (is_weighed_) takeOpacitiesBack();
+  }
+
+  /// The opacities that there are go aside until derivatives are known.
+  void weigh() {
+    if (factors_.empty()) return;
+    aside_.resize(factors_.size());
+    parallelFor(factors_.size(), kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const float opacity = cloud_.opacities[i];
+        aside_[i] = std::min(opacity * factors_[i], 1.0f);
+        factors_[i] = opacity > 0 ? aside_[i] / opacity : factors_[i];
+      }
+    });
+    cloud_.opacities.swap(aside_);
+    is_weighed_ = true;
+  }
+
+  /// Derivatives by weighed opacities become those by the ones that there are.
+  void weighGradients() {
+    parallelFor(factors_.size(), kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) by_.opacities[i] *= factors_[i];
+    });
+    takeOpacitiesBack();
+  }
+
+  void takeOpacitiesBack() {
+    cloud_.opacities.swap(aside_);
+    factors_.clear();
+    is_weighed_ = false;
   }
 
   /// The pass gets its arrays again before it is asked for others.
@@ -337,6 +382,9 @@ class HostBackend final : public RenderBackend {
   std::vector<Target> targets_;
 
   std::unique_ptr<ViewPass> pass_;
+  std::vector<float> factors_;  ///< of the opacities of the next image, or the one that is drawn
+  std::vector<float> aside_;    ///< opacities without them, while is_weighed_
+  bool is_weighed_ = false;
   uint32_t width_ = 0, height_ = 0;  ///< drawn last; 0: nothing of the splats that there are
   SplatCloud by_;                    ///< derivatives; scales and opacities are raw without how_
   bool has_gradients_ = false;       ///< by_ has arrays of the pass

@@ -89,6 +89,10 @@ class RenderBackend : public SplatReader {
   /// number: 0, 1, 2...
   virtual uint32_t addTarget(uint32_t width, uint32_t height, std::span<const float> pixels) = 0;
 
+  /// Multiplies the opacities of the next image, and so its derivatives by them: [N] >= 0, or
+  /// empty. More than opaque counts as opaque. Edits and steps before that image end it.
+  virtual void weighOpacities(std::vector<float> factors) = 0;
+
   /// Draws the splats.
   virtual void forward(const Camera& camera, const RenderOptions& options,
                        Progress* progress = nullptr) = 0;

@@ -71,6 +71,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     transmittance_weight_ = view.is_opaque ? strategy_->transmittanceWeight(moment_) : 0.0;
     Stopwatch watch;
     showTime(view.time);
+    backend_->weighOpacities(strategy_->opacityFactors(moment_, backend_->splatCount()));
     backend_->forward(*view.camera, renderOptions(view), progress);
     report.seconds.render = watch.lap();
 
@@ -126,6 +127,9 @@ class ExplicitModel final : public FitModel, private Regulariser {
   std::vector<uint64_t> budgets() const override { return {backend_->splatCount()}; }
   bool lowersOpacitiesAt(const FitMoment& moment) const override {
     return strategy_->lowersOpacitiesAt(moment);
+  }
+  uint64_t foggyStepsAfter(const FitMoment& moment) const override {
+    return strategy_->foggyStepsAfter(moment);
   }
   SplatQuantities seen() const override { return strategy_->seen(backend_->splatCount()); }
 

@@ -66,6 +66,8 @@ class FitModel {
   /// Whether the step of this moment ends with opacities lowered for what comes after: then the
   /// splats look like fog for some steps.
   virtual bool lowersOpacitiesAt(const FitMoment&) const { return false; }
+  /// Steps for which they do after this moment's.
+  virtual uint64_t foggyStepsAfter(const FitMoment&) const { return 0; }
 
   /// The view of an iteration, as ViewEvaluator counts them, of a model that learns from some views
   /// at a time; empty: the trainer's own order.

@@ -343,6 +343,8 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
     if (!best_ && is_best && !model_->isWholeAtItsEndOnly()) best_ = model_->state();
     try {
       step(pace);
+      const uint64_t foggy = model_->foggyStepsAfter(momentOf(iteration_));
+      foggy_until_ = std::max(foggy_until_, iteration_ + foggy);
     } catch (...) {
       error = std::current_exception();
       break;
@@ -361,7 +363,8 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
     const bool time_is_over =
         options_.checkpoint_seconds > 0 && pace.saved.seconds() >= options_.checkpoint_seconds;
     if (interval_is_over || time_is_over) save(observer, pace);
-    if (observer.wantsPreview()) {
+    // The last clear image stands while opacities come back.
+    if (observer.wantsPreview() && iteration_ >= foggy_until_) {
       const size_t views = observer.wantsContributions() ? kPreviewedViews : 0;
       const std::optional<double> time = observer.previewTime();
       SplatCloud shown = time ? model_->splatsAt(0, *time) : model_->splats(0);

@@ -155,6 +155,7 @@ class Trainer {
   const char* stage_ = "";
 
   uint64_t iteration_ = 0;
+  uint64_t foggy_until_ = 0;  ///< iteration from which opacities that were lowered show again
   FitHistory history_;
   SplatQuantities seen_;
   /// Of history_.best_iteration, where that is not the present one.

@@ -157,6 +157,12 @@ TEST(Adaptive, TellsBeforehandWhenItLowersOpacities) {
   }
   EXPECT_TRUE(strategy->lowersOpacitiesAt(at(3000)));
   EXPECT_FALSE(makeStrategy("mcmc")->lowersOpacitiesAt(at(3000)));
+  // From 0.01 to a half by steps of 0.05 of the logit: 91.9 of them. A limit of 0.8 hides nothing.
+  EXPECT_EQ(strategy->foggyStepsAfter(at(3000)), 92u);
+  EXPECT_EQ(strategy->foggyStepsAfter(at(3001)), 0u);
+  EXPECT_EQ(makeStrategy("mcmc")->foggyStepsAfter(at(3000)), 0u);
+  EXPECT_TRUE(makeStrategy("direction")->lowersOpacitiesAt(at(3500)));
+  EXPECT_EQ(makeStrategy("direction")->foggyStepsAfter(at(3500)), 0u);
 }
 
 TEST(Adaptive, WhatIsRemovedMakesRoom) {

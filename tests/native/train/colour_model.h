@@ -12,6 +12,7 @@ struct ColourModelOptions {
   uint64_t spoils_from = UINT64_MAX;   ///< iteration from which steps lead away from the target
   uint64_t fails_at = UINT64_MAX;      ///< iteration whose step throws
   uint64_t lowers_every = UINT64_MAX;  ///< iterations, after which opacities are said to be lowered
+  uint64_t foggy_steps = 0;            ///< after each of these
 };
 
 /// A model of four numbers, a colour and a sum of gradients, that fits the mean colour of views by
@@ -50,6 +51,9 @@ class ColourModel final : public FitModel {
 
   bool lowersOpacitiesAt(const FitMoment& moment) const override {
     return moment.iteration % options_.lowers_every == 0;
+  }
+  uint64_t foggyStepsAfter(const FitMoment& moment) const override {
+    return lowersOpacitiesAt(moment) ? options_.foggy_steps : 0;
   }
 
   SplatCloud splats(uint64_t) override {

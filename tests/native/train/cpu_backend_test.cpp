@@ -103,6 +103,78 @@ TEST(CpuBackend, GivesTheBitsOfTheSeparateCalls) {
   EXPECT_NE(seen.splats.sh, start.sh);
 }
 
+TEST(CpuBackend, OpacitiesAreWeighedInOneImageAlone) {
+  const SplatCloud start = smallCloud(40, 1, 620);
+  const auto backend = makeCpuBackend();
+  backend->upload(start);
+  const SplatCloud whole = backend->download();
+  std::vector<float> factors(40, 1.25f);
+  for (size_t i = 0; i < factors.size(); i += 3) factors[i] = 0;
+  SplatCloud weighed = whole;
+  for (size_t i = 0; i < factors.size(); ++i) {
+    weighed.opacities[i] = std::min(whole.opacities[i] * factors[i], 1.0f);
+  }
+  ASSERT_EQ(*std::max_element(weighed.opacities.begin(), weighed.opacities.end()), 1.0f);
+  const auto drawn = [](const SplatCloud& cloud) {
+    const SplatInstance instance{&cloud};
+    return renderTiled({&instance, 1}, camera(), overGrey()).colour;
+  };
+
+  backend->weighOpacities(factors);
+  backend->forward(camera(), overGrey());
+  const std::vector<float> image = backend->picture();
+  EXPECT_EQ(image, drawn(weighed));
+  EXPECT_NE(image, drawn(whole));
+  const std::vector<float> wanted = target(621);
+  backend->loss(wanted, {});
+  backend->backward({});
+  std::vector<float> by_picture(image.size());
+  ImageLoss().evaluate(camera().width, camera().height, {image.data(), PixelLayout::kRgba},
+                       {wanted.data(), PixelLayout::kRgb}, nullptr,
+                       {by_picture.data(), PixelLayout::kRgba});
+  BackwardInput input;
+  input.colour_gradient = by_picture;
+  const SplatInstance instance{&weighed};
+  const SplatGradients by =
+      renderBackward({&instance, 1}, camera(), overGrey(), input).instances[0];
+  const std::vector<float> logits = backend->gradients().logits;
+  for (size_t i = 0; i < factors.size(); ++i) {
+    const float opacity = whole.opacities[i];
+    const float factor = weighed.opacities[i] / opacity;  // less than asked for at an opacity of 1
+    EXPECT_FLOAT_EQ(logits[i], by.opacities[i] * factor * (opacity * (1 - opacity))) << i;
+    if (factors[i] == 0) {
+      EXPECT_EQ(backend->gradients().sh[i * 12], 0) << i;
+    }
+  }
+  EXPECT_EQ(backend->download().opacities, whole.opacities);
+
+  // The next image is whole again, after derivatives and without them.
+  for (const bool differentiates : {true, false}) {
+    backend->forward(camera(), overGrey());
+    EXPECT_EQ(backend->picture(), drawn(whole)) << differentiates;
+    backend->weighOpacities(factors);
+    backend->forward(camera(), overGrey());
+    EXPECT_EQ(backend->picture(), drawn(weighed)) << differentiates;
+    if (!differentiates) continue;
+    backend->loss(wanted, {});
+    backend->backward({});
+  }
+  backend->forward(camera(), overGrey());
+  EXPECT_EQ(backend->picture(), drawn(whole));
+}
+
+TEST(CpuBackend, RefusesFactorsThatAreNone) {
+  const auto backend = makeCpuBackend();
+  backend->upload(smallCloud(3, 1, 620));
+  EXPECT_THAT(messageOf([&] { backend->weighOpacities({1, 1}); }), HasSubstr("opacity factors"));
+  EXPECT_THAT(messageOf([&] {
+                backend->weighOpacities({1, -1, 1});
+              }),
+              HasSubstr("the opacity factor of splat 1 is -1"));
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(messageOf([&] { backend->weighOpacities({1, 1, nan}); }), HasSubstr("splat 2"));
+}
+
 TEST(CpuBackend, DerivativesAreThoseByTheRawNumbers) {
   const auto backend = makeCpuBackend();
   backend->upload(smallCloud(40, 1, 610));

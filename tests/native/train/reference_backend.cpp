@@ -1,9 +1,11 @@
 #include "reference_backend.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "base/error.h"
 #include "splat/reference_backward.h"
@@ -317,9 +319,16 @@ class ReferenceBackend final : public RenderBackend {
     return static_cast<uint32_t>(targets_.size() - 1);
   }
 
+  void weighOpacities(std::vector<float> factors) override { factors_ = std::move(factors); }
   void forward(const Camera& camera, const RenderOptions& options, Progress* progress) override {
     poisonCopies();
     cloud_ = cloudOf();
+    drawn_factors_ = std::exchange(factors_, {});
+    for (size_t i = 0; i < drawn_factors_.size(); ++i) {
+      float& opacity = cloud_.opacities[i];
+      drawn_factors_[i] = std::min(drawn_factors_[i], 1 / opacity);
+      opacity = std::min(opacity * drawn_factors_[i], 1.0f);
+    }
     pass_.forward(cloud_, camera, options, progress);
   }
   ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
@@ -337,8 +346,9 @@ class ReferenceBackend final : public RenderBackend {
     BackwardSummary summary =
         pass_.backward(request, regulariser ? regulariser->transmittanceWeight() : 0.0, progress);
     SplatGradients by = pass_.gradients();
+    for (size_t i = 0; i < drawn_factors_.size(); ++i) by.opacities[i] *= drawn_factors_[i];
     if (regulariser && regulariser->readsSplats()) {
-      lent_ = cloud_;
+      lent_ = cloudOf();
       summary.regularisation += regulariser->evaluate(
           lent_, {by.positions, by.rotations, by.scales, by.opacities, by.sh});
       for (auto* values :
@@ -464,6 +474,7 @@ class ReferenceBackend final : public RenderBackend {
   bool has_kept_ = false;
   std::vector<std::vector<float>> targets_;
   SplatCloud cloud_, lent_;
+  std::vector<float> factors_, drawn_factors_;
   ReferencePass pass_;
   // Copies for the host.
   mutable TrainingState state_;

@@ -139,6 +139,32 @@ TEST(RenderSeam, AFitOfExplicitSplatsAgreesWithTheReference) {
   EXPECT_LT(relativeDifference(seen.cloud.sh, expected.cloud.sh), 1e-3);
 }
 
+/// Leaves a fifth of the splats out of each image, and draws the others as much more opaque.
+class LeavesOut final : public Strategy {
+ public:
+  const char* name() const override { return "leaves_out"; }
+  std::vector<float> opacityFactors(const FitMoment& moment, size_t count) const override {
+    std::vector<float> factors(count, 1.25f);
+    for (size_t i = moment.iteration % 5; i < count; i += 5) factors[i] = 0;
+    return factors;
+  }
+};
+
+/// Controls nothing.
+class Nothing final : public Strategy {
+ public:
+  const char* name() const override { return "nothing"; }
+};
+
+TEST(RenderSeam, AFitThatLeavesSplatsOutAgreesWithTheReference) {
+  const FitOutcome expected = explicitFit(ReferenceBackends(), std::make_unique<LeavesOut>());
+  const FitOutcome seen = explicitFit(*cpuBackends(), std::make_unique<LeavesOut>());
+  expectAlike(seen.losses, expected.losses, 1e-5);  // as above
+  EXPECT_LT(relativeDifference(seen.cloud.opacities, expected.cloud.opacities), 1e-3);
+  const FitOutcome whole = explicitFit(*cpuBackends(), std::make_unique<Nothing>());
+  EXPECT_GT(relativeDifference(seen.cloud.opacities, whole.cloud.opacities), 1e-2);
+}
+
 TEST(RenderSeam, AFitOfAFieldAgreesWithTheReference) {
   const auto views = toyViews(toyBall(2000), 8, 24);
   FieldModelOptions options;

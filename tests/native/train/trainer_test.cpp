@@ -27,10 +27,11 @@ class Listener : public FitObserver {
     if (figures.iteration == cancel_at) progress.cancel();
   }
   void note(const std::string& text) override { notes.push_back(text); }
-  bool wantsPreview() override { return preview_at == all.size(); }
+  bool wantsPreview() override { return preview_at <= all.size() && previews.empty(); }
   bool wantsContributions() override { return wants_contributions; }
   void preview(SplatCloud cloud, SplatQuantities seen) override {
     previews.push_back(std::move(cloud));
+    previewed_at = all.size();
     seen_in_preview = std::move(seen);
   }
   void save(const TensorTable& table) override {
@@ -46,7 +47,8 @@ class Listener : public FitObserver {
   std::vector<TensorTable> saved;
   Progress progress;
   uint64_t cancel_at = UINT64_MAX;
-  size_t preview_at = SIZE_MAX;
+  size_t preview_at = SIZE_MAX;  // steps done before the one that it is wanted after
+  size_t previewed_at = SIZE_MAX;
   bool disk_is_full = false;
 };
 
@@ -347,6 +349,20 @@ TEST(Trainer, HandsOverAPreviewWhereItIsWanted) {
   fit.run();
   ASSERT_EQ(fit.listener.previews.size(), 1u);
   EXPECT_EQ(fit.listener.previews[0].size(), 1u);
+}
+
+TEST(Trainer, HandsOverNoPreviewWhileOpacitiesComeBack) {
+  ColourModelOptions lowers;
+  lowers.lowers_every = 10;
+  lowers.foggy_steps = 4;
+  for (const size_t wanted : {8u, 9u, 11u, 13u, 14u, 19u}) {
+    Fit fit(colourViews(16, 0.2f, 0.6f, 0.8f), optionsOf(30), lowers);
+    fit.listener.preview_at = wanted;
+    fit.run();
+    // The tenth step lowers them; what the fourth after it leaves is clear.
+    const size_t clear = wanted == 19 ? 23 : wanted >= 9 && wanted < 13 ? 13 : wanted;
+    EXPECT_EQ(fit.listener.previewed_at, clear) << wanted;
+  }
 }
 
 TEST(Trainer, PutsTransparentViewsBeforeTheBackground) {
