@@ -119,6 +119,24 @@ void steps(benchmark::State& state, const SplatCase& c) {
   });
 }
 
+/// Iterations that leave splats out, of which some are drawn more opaque, against whole ones.
+void dropoutSteps(benchmark::State& state, const SplatCase& c) {
+  OneView view(c);
+  ExplicitModelOptions options;
+  options.sh_degree = c.degree;
+  const auto modelOf = [&](const char* strategy) {
+    return makeExplicitModel(*cpuBackends(), cloudOf(c), makeStrategy(strategy), options);
+  };
+  const auto thinned = modelOf("adaptive+splat_dropout");
+  const auto whole = modelOf("adaptive");
+  uint64_t iteration = 600000;  // after the last event
+  withThreads(2, [&] {
+    compare(
+        state, "all_splats", [&] { view.step(*thinned, ++iteration, 1000000); },
+        [&] { view.step(*whole, iteration + 1, 1000000); });
+  });
+}
+
 /// A strategy that makes a twentieth more splats of those of the case at iteration 600, wherever it
 /// has a threshold: of whatever is pulled at.
 struct EventSettings {
@@ -201,6 +219,11 @@ void densifyEvent(benchmark::State& state, const std::string& name) {
 const bool registered = [] {
   for (const SplatCase& c : kStepCases) {
     benchmark::RegisterBenchmark((std::string("train.step.explicit.") + c.name).c_str(), steps, c)
+        ->UseManualTime()
+        ->Iterations(kRounds)
+        ->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark((std::string("train.step.dropout.") + c.name).c_str(),
+                                 dropoutSteps, c)
         ->UseManualTime()
         ->Iterations(kRounds)
         ->Unit(benchmark::kMillisecond);
