@@ -97,10 +97,22 @@ TEST(FittingStability, FlatViewsByEveryStrategy) {
   }
 }
 
+/// Nine splats of ten are left out of the last images, and the rest is as opaque as can be.
+TEST(FittingStability, NearlyAllSplatsAreLeftOut) {
+  for (const std::string& name : strategyNames()) {
+    SCOPED_TRACE(name);
+    ExplicitModelOptions options = small();
+    options.strategy = name + "+splat_dropout(rate=0.9)";
+    EXPECT_GT(fitted(*constantViews(0.5f, 1, 2), 700, options)->splats(0).size(), 0u);
+    EXPECT_GT(fitted(*constantViews(0.5f, 0, 1), 500, options, 0.0)->splats(0).size(), 0u);
+  }
+}
+
 /// Two views of one clip that say different things: at the same place in time almost, far away from
 /// each other and from 0, and with nothing to see.
 TEST(FittingStability, MovingSplatsOfHardClips) {
-  for (const char* strategy : {"temporal", "frequency", "adaptive+filter_3d", "mcmc+offset_warp"}) {
+  for (const char* strategy : {"temporal", "frequency", "adaptive+filter_3d", "mcmc+offset_warp",
+                               "temporal+splat_dropout"}) {
     for (const double apart : {1e-9, 1.0, 1e12}) {
       for (const float alpha : {0.0f, 1.0f}) {
         SCOPED_TRACE(std::string(strategy) + ", " + std::to_string(apart));

@@ -1,5 +1,6 @@
 // Based on: Park, Ryu, Kim, DropGaussian: Structural Regularization for Sparse-view Gaussian
-// Splatting, CVPR 2025, equations 5 to 7.
+// Splatting, CVPR 2025, equations 5 to 7. Differs: the share goes by the number of views, where the
+// paper has 0.2 for all.
 
 #include "densify/parts/splat_dropout.h"
 
@@ -25,7 +26,9 @@ class SplatDropout final : public ControlPart {
   std::vector<float> opacityFactors(const ControlMoment& moment, size_t count) const override {
     const double done = static_cast<double>(moment.iteration) /
                         static_cast<double>(std::max<uint64_t>(moment.iterations, 1));
-    const double share = options_.rate * std::clamp(done, 0.0, 1.0);
+    const double views = static_cast<double>(std::max<uint64_t>(moment.view_count, 1));
+    const double last = std::min(options_.rate, options_.views / views);
+    const double share = last * std::clamp(done, 0.0, 1.0);
     if (!(share > 0)) return {};
     std::vector<float> factors(count);
     const float more = static_cast<float>(1 / (1 - share));
@@ -47,6 +50,7 @@ class SplatDropout final : public ControlPart {
 std::unique_ptr<ControlPart> splatDropout(StrategySettings& settings) {
   SplatDropoutOptions options;
   options.rate = settings.number("rate", options.rate, 0, 0.9);
+  options.views = settings.number("views", options.views, 0, 1e6);
   return makeSplatDropout(options);
 }
 

@@ -35,9 +35,9 @@ double shareOf(const std::vector<float>& factors) {
 TEST(SplatDropout, LeavesOutAShareThatGrowsAndKeepsTheMeanOpacity) {
   for (const uint64_t iteration : {3000u, 15000u, 30000u}) {
     const std::vector<float> factors = factorsAt(iteration);
-    const double expected = 0.2 * static_cast<double>(iteration) / 30000;
-    // Of a binomial share the standard deviation is below 0.0013; four of them.
-    EXPECT_NEAR(shareOf(factors), expected, 0.005) << iteration;
+    const double expected = 0.4 * static_cast<double>(iteration) / 30000;
+    // Of a binomial share the standard deviation is below 0.0016; four of them.
+    EXPECT_NEAR(shareOf(factors), expected, 0.0065) << iteration;
     const float kept = *std::max_element(factors.begin(), factors.end());
     EXPECT_FLOAT_EQ(kept, static_cast<float>(1 / (1 - expected))) << iteration;
   }
@@ -45,6 +45,19 @@ TEST(SplatDropout, LeavesOutAShareThatGrowsAndKeepsTheMeanOpacity) {
   EXPECT_TRUE(factorsAt(0).empty());
   EXPECT_TRUE(factorsAt(30000, "splat_dropout(rate=0)").empty());
   EXPECT_TRUE(makeStrategy("adaptive")->opacityFactors(at(30000), kCount).empty());
+}
+
+TEST(SplatDropout, LeavesOutFewerWhereViewsAreMany) {
+  const auto shareWith = [](uint64_t views, const std::string& part) {
+    FitMoment moment = at(30000);
+    moment.view_count = views;
+    return shareOf(makeStrategy("adaptive+" + part)->opacityFactors(moment, kCount));
+  };
+  EXPECT_NEAR(shareWith(8, "splat_dropout"), 0.4, 0.0065);
+  EXPECT_NEAR(shareWith(25, "splat_dropout"), 0.2, 0.0055);
+  EXPECT_NEAR(shareWith(100, "splat_dropout"), 0.05, 0.003);
+  EXPECT_NEAR(shareWith(100, "splat_dropout(views=30)"), 0.3, 0.006);
+  EXPECT_NEAR(shareWith(100, "splat_dropout(views=1000,rate=0.2)"), 0.2, 0.0055);
 }
 
 TEST(SplatDropout, LeavesOutOthersInEveryIterationAndTheSameForTheSameSeed) {
@@ -55,9 +68,9 @@ TEST(SplatDropout, LeavesOutOthersInEveryIterationAndTheSameForTheSameSeed) {
     for (size_t i = 0; i < kCount; ++i) both += first[i] == 0 && other[i] == 0 ? 1 : 0;
     return static_cast<double>(both) / kCount;
   };
-  // 0.2 of the 0.2, if they know nothing of each other.
-  EXPECT_NEAR(alike(factorsAt(29999)), 0.04, 0.003);
-  EXPECT_NEAR(alike(factorsAt(30000, "splat_dropout", 8)), 0.04, 0.003);
+  // 0.4 of the 0.4, if they know nothing of each other.
+  EXPECT_NEAR(alike(factorsAt(29999)), 0.16, 0.005);
+  EXPECT_NEAR(alike(factorsAt(30000, "splat_dropout", 8)), 0.16, 0.005);
   withThreads(1, [&] { EXPECT_EQ(factorsAt(30000), first); });
 }
 
