@@ -61,7 +61,9 @@ fi
 simd=ON
 # zig's linker, which links the programs that come with libjpeg, knows no absolute symbols, which nasm writes.
 [[ $kind == macos_x64 ]] && simd=OFF
-own_build jpeg -DENABLE_SHARED=OFF -DWITH_TURBOJPEG=OFF -DWITH_SIMD=$simd -DREQUIRE_SIMD=$simd
+# nasm writes the time and the folder into objects for Windows unless it is told not to.
+own_build jpeg -DENABLE_SHARED=OFF -DWITH_TURBOJPEG=OFF -DWITH_SIMD=$simd -DREQUIRE_SIMD=$simd \
+  -DCMAKE_ASM_NASM_FLAGS=--reproducible
 own_build imath -DIMATH_INSTALL_PKG_CONFIG=OFF
 own_build openexr -DOPENEXR_BUILD_TOOLS=OFF -DOPENEXR_INSTALL_EXAMPLES=OFF -DOPENEXR_INSTALL_PKG_CONFIG=OFF \
   -DOPENEXR_INSTALL_TOOLS=OFF
