@@ -78,7 +78,8 @@ class HostBackend final : public RenderBackend {
   const RawSplats& secondMoments() const override { return held_.second_moments; }
 
   uint64_t memoryBytes() const override {
-    uint64_t floats = cloud_.scales.capacity() + cloud_.opacities.capacity();
+    uint64_t floats = cloud_.scales.capacity() + cloud_.opacities.capacity() + factors_.capacity() +
+                      aside_.capacity();
     for (const auto* values :
          {&by_.positions, &by_.rotations, &by_.scales, &by_.opacities, &by_.sh}) {
       floats += values->capacity();
