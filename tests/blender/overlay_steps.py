@@ -37,9 +37,12 @@ def settings():
 
 
 def live(_window):
-    """The preview of a fit that runs tells contributions."""
+    """The preview of a fit that runs tells contributions, of splats that are no longer as faint as they begin."""
     obj = bpy.data.objects.get('Sphere Fit')
     if obj is None or 'seen:contribution' not in obj.data.attributes or len(obj.data.attributes['scale'].data) < 500:
+        return False
+    opacities = [element.color[3] for element in obj.data.attributes['radiance:base'].data]
+    if sum(opacities) / len(opacities) < 0.3:
         return False
     facts['is_running'] = module('.scene.fit.fitting').state.is_running
     return 'live'
