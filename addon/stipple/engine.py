@@ -30,12 +30,12 @@ class NativeWork:
         """Until the job ends; a cancel in Blender cancels it."""
         while True:
             state, fraction, stage = job.poll()
+            self._say(fraction, stage)  # also of what has ended before it was looked at
             if state != structs.JobState.RUNNING:
                 job.wait()
                 return
             if self._cancelled():
                 job.cancel()
-            self._say(fraction, stage)
             time.sleep(POLL_SECONDS)
 
     def _decode_instances(self):
