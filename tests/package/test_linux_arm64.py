@@ -204,9 +204,11 @@ def test_a_fit_comes_to_the_same(works):
 
 
 def test_errors_are_the_same_sentences(works):
-    # Who may do everything writes what is read-only, too: what is said depends on who runs this.
-    said = [line.replace(str(works['x64']), str(works['arm64'])) for line in works['x64 said']]
-    assert len(said) == len(test_windows.SAID) and works['arm64 said'] == said
+    expected = [line.format(works['arm64']) for line in test_windows.SAID]
+    # Who may do everything writes what is read-only, too: what is said of it depends on who runs this. An ordinary
+    # build reads images by OpenImageIO, which has words of its own.
+    expected[1] = works['x64 said'][1].replace(str(works['x64']), str(works['arm64']))
+    assert works['arm64 said'] == expected
 
 
 @pytest.fixture(scope='module')
