@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Import and export: bits, transforms, formats."""
 
+import sys
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -8,6 +11,9 @@ from mathutils import Euler, Matrix
 
 import scenes
 from test_splat_data import make_arrays
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import usd_schema  # noqa: E402
 
 
 def write_ply(stipple, path, arrays):
@@ -223,6 +229,7 @@ def test_usd_keeps_objects_and_has_shared_splats_once(stipple, tmp_path):
     assert text.count('point3f[] positions') == 1 and one.read_text().count('point3f[] positions') == 1
     assert text.count('instanceable = true') == 4 and 'def Xform "tree_001"' in text
     assert 3.5 * kept.stat().st_size < one.stat().st_size
+    assert usd_schema.faults(kept) == usd_schema.faults(one) == []
     joined, apart = load(stipple, ply), load(stipple, kept)
     assert apart.count == joined.count == 12000
     np.testing.assert_allclose(apart.positions, joined.positions, atol=1e-5)

@@ -4,11 +4,15 @@ import os
 import re
 import struct
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy
 import pytest
 from node_packages import gltf_issues, splat_transform, usd_layer
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import usd_schema  # noqa: E402
 
 TOOL = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
 COUNT = 3000
@@ -229,6 +233,57 @@ def test_tinyusdz_reads_our_halves(ply, tmp_path):
         assert f'{kind}[] {name}h = [' in half
         numpy.testing.assert_allclose(usd_array(half, f'{name}h'), usd_array(single, name), rtol=2 ** -10, atol=1e-7)
     numpy.testing.assert_array_equal(usd_array(half, 'positions'), usd_array(single, 'positions'))
+
+
+def test_openusd_reads_our_usd_as_it_is(ply, tmp_path):
+    usd = pytest.importorskip('pxr.Usd', reason='OpenUSD is not installed')
+    run('convert', ply, tmp_path / 'cloud.usda')
+    run('convert', ply, tmp_path / 'ours.ply', '--frame', 'RUB')
+    prim = usd.Stage.Open(str(tmp_path / 'cloud.usda')).GetDefaultPrim()
+    assert prim.GetTypeName() == usd_schema.PRIM
+    ours = read_ply(tmp_path / 'ours.ply')
+    numpy.testing.assert_array_equal(numpy.array(prim.GetAttribute('positions').Get()),
+                                     numpy.stack([ours[name] for name in 'xyz'], axis=1))
+    assert len(prim.GetAttribute('radiance:sphericalHarmonicsCoefficients').Get()) == 16 * COUNT
+
+
+@pytest.mark.parametrize('options', [(), ('--half',), ('--frame', 'RFU'), ('--degree', 0), ('--degree', 2)])
+@pytest.mark.parametrize('extension', ['.usda', '.usdz'])
+def test_our_usd_keeps_the_rules_of_the_schema(ply, tmp_path, extension, options):
+    run('convert', ply, tmp_path / f'cloud{extension}', *options)
+    assert usd_schema.faults(tmp_path / f'cloud{extension}') == []
+
+
+@pytest.mark.parametrize('extension', ['.usda', '.usdz'])
+def test_our_series_keep_the_rules_of_the_schema(ply, tmp_path, extension):
+    run('decode', ply, tmp_path / 'few.ply', '--anchors', 500)
+    run('series', tmp_path / 'few.ply', ply, tmp_path / 'few.ply', tmp_path / f'film{extension}', '--frame-rate', 24)
+    assert usd_schema.faults(tmp_path / f'film{extension}') == []
+
+
+@pytest.mark.parametrize('good, bad, fault', [
+    ('point3f[] positions', 'float3[] positions', 'positions is of type float3[], not point3f[]'),
+    ('point3f[] positions', 'point3f[] places', 'there are no positions'),
+    ('uniform int', 'int', 'is not a uniform int'),
+    ('Degree = 3', 'Degree = 2', 'has 800 rows, not 450'),
+    ('float[] opacities = [\n', 'float[] opacities = [\n1.5,\n', 'opacities has 51 rows, not 50'),
+    ('float[] opacities = [\n0.', 'float[] opacities = [\n-0.', 'an opacity lies outside 0 to 1'),
+    ('float3[] scales = [\n(', 'float3[] scales = [\n(-', 'a scale is below zero'),
+    ('quatf[] orientations = [\n(', 'quatf[] orientations = [\n(9', 'an orientation is no unit quaternion'),
+    ('float3[] extent = [(-', 'float3[] extent = [(', 'a position lies outside the extent'),
+    ('float3[] extent = [(', 'float3[] extent = [(0, 0, 0), (', 'extent does not have two corners'),
+    ('defaultPrim = "Splats"', 'defaultPrim = "Sprats"', 'the default prim'),
+    ('upAxis = "Y"', 'upAxis = "X"', 'upAxis is X'),
+    ('def ParticleField3DGaussianSplat', 'def Points', 'there is no ParticleField3DGaussianSplat'),
+    ('metersPerUnit = 1', 'metersPerUnit = 0', 'metersPerUnit is 0'),
+    ('#usda 1.0', '#sdf 1.4.32', 'the first line'),
+])
+def test_broken_rules_are_found(ply, tmp_path, good, bad, fault):
+    run('decode', ply, tmp_path / 'few.ply', '--anchors', 50)
+    run('convert', tmp_path / 'few.ply', tmp_path / 'few.usda')
+    text = (tmp_path / 'few.usda').read_text()
+    assert good in text
+    assert any(fault in found for found in usd_schema.faults_of_layer(text.replace(good, bad, 1)))
 
 
 def test_we_read_the_usd_that_tinyusdz_writes(ply, tmp_path):
