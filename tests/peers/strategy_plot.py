@@ -8,7 +8,7 @@ from html import escape
 
 PANEL, MARGIN, GAP = (380, 300), (60, 40), 30   # pixels
 COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#000000', '#999933', '#882255', '#44aa99',
-           '#777777')
+           '#777777', '#f0e442')
 
 
 def ticks(low, high, count=5):
