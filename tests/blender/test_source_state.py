@@ -398,7 +398,7 @@ def cancelled(stipple, monkeypatch):
 
 @pytest.mark.parametrize('phase', ['import', 'sequence', 'make', 'budget', 'volume', 'export', 'relink', 'crop'])
 def test_cancel_in_any_phase(stipple, tmp_path, unchanged, request, phase):  # noqa: F811
-    obj, path = make(stipple, tmp_path, 'CLOUD', 400_000 if phase == 'relink' else 20_000)
+    obj, path = make(stipple, tmp_path, 'CLOUD', 1_000_000 if phase == 'relink' else 20_000)
     for i in (1, 2):
         write_ply(stipple, tmp_path / f'n_{i}.ply', make_arrays(stipple, 20_000))
     quad, ball = scenes.quad(), scenes.sphere()
@@ -411,7 +411,7 @@ def test_cancel_in_any_phase(stipple, tmp_path, unchanged, request, phase):  # n
     call = {'import': lambda: ops.splats_import(filepath=path),
             'sequence': lambda: ops.splats_to_volume(filepath=str(tmp_path / 'out.vdb'), frames='SERIES'),
             'make': lambda: ops.splats_from_mesh(anchors=100_000), 'budget': ops.add_budget,
-            'volume': lambda: ops.splats_to_volume(filepath=str(tmp_path / 'out.vdb'), resolution=64),
+            'volume': lambda: ops.splats_to_volume(filepath=str(tmp_path / 'out.vdb'), resolution=256),
             'export': lambda: ops.splats_export(filepath=str(tmp_path / 'out.ply')),
             'relink': lambda: ops.relink(again=True), 'crop': ops.crop_by_mesh}[phase]
     assert call() == {'CANCELLED'}
