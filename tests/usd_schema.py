@@ -23,7 +23,7 @@ ARRAYS = {'positions': ('point3f[]', 'point3h[]', 3), 'orientations': ('quatf[]'
           'radiance:sphericalHarmonicsCoefficients': ('float3[]', 'half3[]', 3)}
 DEGREE = 'radiance:sphericalHarmonicsDegree'
 HINTS = {'projectionModeHint': {'perspective', 'tangential'},
-         'sortingModeHint': {'zDepth', 'cameraDistance', 'rayHitDistance'}}
+         'sortingModeHint': {'zDepth', 'cameraDistance'}}
 USUAL_DEGREE = 3
 ALIGNMENT = 64
 # Of a unit quaternion's length: three roundings of a number in half precision, and what is left in single precision.
@@ -78,7 +78,7 @@ class Layer:
         if token in ENDS:
             end, values = ENDS[token], []
             while self._next() != end:
-                values.append(self._value() if token != '{' else self._take())
+                values.append(self._value() if token != '{' or self._next() in ENDS else self._take())
                 if self._next() in (',', ';'):
                     self._take()
             self._take(end)
@@ -105,9 +105,10 @@ class Layer:
         prim = {'specifier': self._take(), 'type': '', 'attributes': {}, 'prims': [], 'metadata': {}}
         if prim['specifier'] not in ('def', 'over', 'class'):
             raise Fault(f"'{prim['specifier']}' begins no prim")
-        if not self._next().startswith('"'):
-            prim['type'] = self._take()
-        prim['name'] = self._take().strip('"')
+        name = self._take()
+        if not name.startswith('"'):
+            prim['type'], name = name, self._take()
+        prim['name'] = name.strip('"')
         if self._next() == '(':
             prim['metadata'] = self._metadata()
         self._take('{')

@@ -277,6 +277,7 @@ def test_our_series_keep_the_rules_of_the_schema(ply, tmp_path, extension):
     ('def ParticleField3DGaussianSplat', 'def Points', 'there is no ParticleField3DGaussianSplat'),
     ('metersPerUnit = 1', 'metersPerUnit = 0', 'metersPerUnit is 0'),
     ('#usda 1.0', '#sdf 1.4.32', 'the first line'),
+    ('"Splats"\n{', '"Splats"\n', 'is expected where'),
 ])
 def test_broken_rules_are_found(ply, tmp_path, good, bad, fault):
     run('decode', ply, tmp_path / 'few.ply', '--anchors', 50)
