@@ -16,6 +16,7 @@
 #include "densify/splat_edit.h"
 #include "densify/statistic.h"
 #include "math/camera.h"
+#include "math/vec.h"
 
 namespace stipple {
 
@@ -37,14 +38,15 @@ struct StandaloneEvent {
 
 /// Where a fit stands.
 struct FitMoment {
-  uint64_t iteration = 1;       ///< 1 for the first
-  uint64_t iterations = 30000;  ///< of the whole fit
-  double extent = 1;            ///< of the cameras: 1.1 times the largest distance from their mean
-  uint64_t seed = 0;            ///< of the fit; numbers are keyed by (seed, use, iteration, row)
-  uint64_t max_splats = 0;      ///< hard cap of the count; 0: none
-  double position_rate = 0;     ///< of Adam in this iteration, metres
-  size_t view_count = 0;        ///< that are learned from; 0: not known
-  double time = 0;              ///< seconds, of the view of this iteration; 0 where nothing moves
+  uint64_t iteration = 1;        ///< 1 for the first
+  uint64_t iterations = 30000;   ///< of the whole fit
+  double extent = 1;             ///< of the cameras: 1.1 times the largest distance from their mean
+  Vec3d centre = Vec3d::Zero();  ///< mean place of the cameras, metres
+  uint64_t seed = 0;             ///< of the fit; numbers are keyed by (seed, use, iteration, row)
+  uint64_t max_splats = 0;       ///< hard cap of the count; 0: none
+  double position_rate = 0;      ///< of Adam in this iteration, metres
+  size_t view_count = 0;         ///< that are learned from; 0: not known
+  double time = 0;               ///< seconds, of the view of this iteration; 0 where nothing moves
   const TrainingView* view = nullptr;  ///< of this iteration; nullptr where none is under way
   std::optional<StandaloneEvent> standalone = {};  ///< there is no fit
 };

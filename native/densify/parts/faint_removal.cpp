@@ -1,5 +1,5 @@
 // Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting for Real-Time Radiance
-// Field Rendering, SIGGRAPH 2023, section 5.2.
+// Field Rendering, SIGGRAPH 2023, section 5.2. Differs: what is far from the cameras may be larger.
 
 #include "densify/parts/faint_removal.h"
 
@@ -43,8 +43,18 @@ class FaintRemoval final : public ControlPart {
     const float huge =
         judges_size ? logShareOfExtent(moment, options_.largest_share) : kLargestLogScale;
     for (size_t i = 0; i < goes.size(); ++i) {
-      if (splats.logits[i] < least_logit || largestLogScale(splats, i) > huge) goes[i] = 1;
+      if (splats.logits[i] < least_logit) goes[i] = 1;
+      const float size = largestLogScale(splats, i);
+      // Few splats come to the second comparison.
+      if (size > huge && !isFarEnoughFor(size, moment, &splats.positions[i * 3])) goes[i] = 1;
     }
+  }
+
+  /// Whether a splat is at most largest_share of its distance from the cameras' centre in size.
+  bool isFarEnoughFor(float log_size, const FitMoment& moment, const float* position) const {
+    const Vec3d place = Eigen::Map<const Vec3f>(position).cast<double>();
+    return static_cast<double>(activatedScale(log_size)) <=
+           options_.largest_share * (place - moment.centre).norm();
   }
 
   FaintRemovalOptions options_;

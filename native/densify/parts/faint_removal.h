@@ -8,8 +8,8 @@ namespace stipple {
 
 struct FaintRemovalOptions {
   double least_opacity = 0.005;  ///< fainter splats go
-  /// Of the cameras' extent: larger splats go, once opacities have been reset; 0: none do. Nor do
-  /// those of a cloud that takes no steps.
+  /// Of the cameras' extent, or of the distance from their centre where that is more: larger splats
+  /// go, once opacities have been reset; 0: none do. Nor do those of a cloud that takes no steps.
   double largest_share = 0.1;
   uint64_t size_after = 3000;  ///< iterations of 30,000 from which on size is judged
   /// Iterations of 30,000 from which on nothing goes any more; 0: until the last event.
@@ -21,7 +21,8 @@ struct FaintRemovalOptions {
 
 /// Faint and huge splats go at every event, children that were just made too. Owns kRemoval.
 /// Size is the largest scale in the world; sizes in the picture are not looked at, as the published
-/// program forgets them before it looks.
+/// program forgets them before it looks. It judges a sky by the cameras' extent, too, so that none
+/// may be large, and each camera gets a fog of its own in its place.
 std::unique_ptr<ControlPart> makeFaintRemoval(const FaintRemovalOptions& options = {});
 
 }  // namespace stipple

@@ -42,6 +42,7 @@ class CloudDensifier {
     origins_.resize(cloud.size());
     for (uint32_t i = 0; i < origins_.size(); ++i) origins_[i] = i;
     moment_.extent = extentOfCameras(pictures_.views(), shown_);
+    moment_.centre = centreOfCameras(pictures_.views(), shown_);
     moment_.seed = options.seed;
     moment_.view_count = shown_.size();
     moment_.max_splats = densifyLimit(cloud.size(), options);

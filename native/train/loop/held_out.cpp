@@ -94,10 +94,14 @@ FitViews splitViews(const ViewSource& views, uint64_t every) {
   return split;
 }
 
-double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen) {
+Vec3d centreOfCameras(const ViewSource& views, std::span<const size_t> chosen) {
   Vec3d mean = Vec3d::Zero();
   for (const size_t view : chosen) mean += placeOf(views.camera(view));
-  mean /= static_cast<double>(chosen.size());
+  return mean / static_cast<double>(chosen.size());
+}
+
+double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen) {
+  const Vec3d mean = centreOfCameras(views, chosen);
   double largest = 0;
   for (const size_t view : chosen) {
     largest = std::max(largest, (placeOf(views.camera(view)) - mean).norm());

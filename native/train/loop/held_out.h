@@ -30,6 +30,9 @@ struct FitViews {
 /// In: every: 0: none. Where there are fewer than `every` views or cameras, none is held out.
 FitViews splitViews(const ViewSource& views, uint64_t every);
 
+/// Mean place of the cameras, metres. In: chosen: at least one.
+Vec3d centreOfCameras(const ViewSource& views, std::span<const size_t> chosen);
+
 /// 1.1 times the largest distance of a camera from the mean of all, metres: the unit of published
 /// learning rates of positions. Cameras of one place: their mean distance to the known points, and
 /// 1 where there are none. In: chosen: at least one.

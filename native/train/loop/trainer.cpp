@@ -120,6 +120,7 @@ Trainer::Trainer(const BackendFactory& backends, std::shared_ptr<const ViewSourc
     fail(ErrorCode::kInvalidArgument, "there are no views to learn from; at least one is needed");
   }
   extent_ = extentOfCameras(pictures_.views(), split_.training);
+  centre_ = centreOfCameras(pictures_.views(), split_.training);
   measure_.tellMoving(pictures_.views());
   double background[3];
   backgroundOf(0, background);
@@ -143,6 +144,7 @@ FitMoment Trainer::momentOf(uint64_t iteration) const {
   moment.iteration = iteration;
   moment.iterations = options_.iterations;
   moment.extent = extent_;
+  moment.centre = centre_;
   moment.seed = options_.seed;
   moment.max_splats = options_.max_splats;
   moment.view_count = split_.training.size();

@@ -146,7 +146,8 @@ class Trainer {
   std::vector<size_t> measured_;  ///< views, while it runs
   std::vector<size_t> choosing_;  ///< views that the best state is chosen by
   std::unique_ptr<FitModel> model_;
-  double extent_;
+  double extent_;  ///< of the cameras that are learned from, and their centre
+  Vec3d centre_ = Vec3d::Zero();
   ViewOrder order_;
   ViewMeasure measure_;
   std::unique_ptr<FitViewEvaluator> evaluator_;

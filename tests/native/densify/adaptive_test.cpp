@@ -121,6 +121,19 @@ TEST(Adaptive, RemovesFaintSplatsAndLaterHugeOnes) {
   EXPECT_THAT(*editAt(*later, at(3100), splatsOf(kinds))->keep, ElementsAre(2, 3));
 }
 
+TEST(Adaptive, WhatIsFarFromTheCamerasMayBeLarge) {
+  // At 0, 1 ... 4 m, of cameras that are spread over one metre: a tenth of the distance or of that
+  // metre, whichever is more.
+  const std::vector<Kind> kinds = {
+      {0.2f, 0.5f}, {0.101f, 0.5f}, {0.199f, 0.5f}, {0.31f, 0.5f}, {0.399f, 0.5f}};
+  const auto strategy = makeStrategy("adaptive");
+  EXPECT_THAT(*editAt(*strategy, at(3100), splatsOf(kinds))->keep, ElementsAre(2, 4));
+  FitMoment moment = at(3100);
+  moment.centre.x() = 4;
+  const auto other = makeStrategy("adaptive");
+  EXPECT_THAT(*editAt(*other, moment, splatsOf(kinds))->keep, ElementsAre(0, 1, 2));
+}
+
 TEST(Adaptive, AHugeSplatLivesOnInChildrenThatAreNot) {
   const std::vector<Kind> kinds = {{0.15f, 0.5f}, {0.17f, 0.5f}, {0.005f, 0.5f}};
   const auto strategy = makeStrategy("adaptive");

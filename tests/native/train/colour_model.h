@@ -42,6 +42,7 @@ class ColourModel final : public FitModel {
     seen_backgrounds.push_back(view.background[0]);
     seen_times.push_back(view.time);
     seen_moments.push_back(moment.time);
+    seen_centres.push_back(moment.centre.x());
     StepReport report;
     report.loss = loss;
     report.splat_count = 1;
@@ -86,6 +87,7 @@ class ColourModel final : public FitModel {
   std::vector<double> seen_backgrounds;
   std::vector<double> seen_times;    ///< of the views
   std::vector<double> seen_moments;  ///< of the moments
+  std::vector<double> seen_centres;  ///< x of the cameras' mean place, of the moments
 
  private:
   ColourModelOptions options_;

@@ -532,5 +532,13 @@ TEST(Trainer, TellsTheModelWhenEachPictureWasTaken) {
   EXPECT_EQ(fit.model->seen_moments, fit.model->seen_times);
 }
 
+TEST(Trainer, TellsTheModelWhereTheCamerasAreThatItLearnsFrom) {
+  Fit fit(colourViews(9, 0.2f, 0.6f, 0.4f), optionsOf(2));
+  fit.run();
+  // At x = 0, 0.1 ... 0.8; the first and the last one are held out.
+  ASSERT_EQ(fit.model->seen_centres.size(), 2u);
+  for (const double x : fit.model->seen_centres) EXPECT_NEAR(x, 0.4, 1e-12);
+}
+
 }  // namespace
 }  // namespace stipple
