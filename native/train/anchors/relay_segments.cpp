@@ -11,9 +11,9 @@ namespace stipple {
 
 namespace {
 
-constexpr double kGlobalShare = 0.3;
-constexpr double kKeyFrameShare = 0.25;
-constexpr double kBlendShare = 0.1;
+constexpr double kGlobalShare = 0.4;
+constexpr double kKeyFrameShare = 0.05;
+constexpr double kBlendShare = 0.05;
 /// A window draws a view at its key frame so often while it draws one at the next key frame once.
 constexpr double kMostDraws = 4;
 /// A window begins with what is so near to its key frame, in units of the spacing, and reaches all

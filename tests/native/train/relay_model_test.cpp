@@ -119,14 +119,14 @@ TEST(RelaySegments, HaveAllStagesInTheirOrder) {
   const std::vector<RelaySegment> segments = relaySegments(1000, clip);
   ASSERT_EQ(segments.size(), 1u + 3 + 3 + 2);
   EXPECT_EQ(segments.front().begin, 0u);
-  EXPECT_EQ(segments.front().end, 300u);
+  EXPECT_EQ(segments.front().end, 400u);
   EXPECT_EQ(segments.back().end, 1000u);
   for (size_t i = 1; i < segments.size(); ++i) {
     EXPECT_EQ(segments[i].begin, segments[i - 1].end) << i;
     EXPECT_GE(segments[i].stage, segments[i - 1].stage) << i;
   }
   EXPECT_EQ(segments[4].stage, RelayStage::kWindow);
-  EXPECT_NEAR(static_cast<double>(segments[4].end - segments[4].begin), 350.0 / 3, 1);
+  EXPECT_NEAR(static_cast<double>(segments[4].end - segments[4].begin), 500.0 / 3, 1);
   // Without blending its steps go to the windows; few steps leave one for each segment.
   EXPECT_EQ(relaySegments(1000, clipOf(25, 8, KeyFrameBlend::kNone)).size(), 7u);
   for (const RelaySegment& one : relaySegments(3, clip)) EXPECT_GT(one.end, one.begin);
