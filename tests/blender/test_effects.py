@@ -243,6 +243,15 @@ def test_costs_of_a_long_blur_are_counted_from_a_short_one(stipple, shot, camera
     assert plan_of(stipple)['DEPTH_OF_FIELD'].seconds > time.perf_counter() - begin
 
 
+def test_costs_are_told_by_the_fastest_images(stipple):
+    """As it once came in a test beside other work, where the median of three differences was called nothing."""
+    difference = module(stipple, 'scene.view.effect_costs').difference
+    assert difference((24.0, 70.0, 25.0), (3.0, 3.5, 60.0)) == 21.0
+    assert difference((24.0, 70.0, 45.0), (23.0, 30.0, 60.0)) is None  # the machine's, and not the effect's
+    assert difference((3.0, 3.5), (4.0, 4.5)) is None
+    assert difference((24.0,), (3.0,)) == 21.0
+
+
 def test_settings_can_be_shown(shot, camera):
     assert bpy.ops.stipple.show_setting(tab='DATA') == {'FINISHED'}
     assert bpy.context.view_layer.objects.active == camera

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each effect of an image takes: its time with it less that without it, for the present view."""
 
-import statistics
 import time
 
 from ...binding.renderer import Renderer
@@ -10,12 +9,25 @@ from ...jobs import Task
 from ..source import sources
 from . import effects, mattes, picture_options, quality
 
-# Images with and without, alternately; the median of the differences counts where it is above half their range.
-REPETITIONS = 3
+# Images with and without an effect are drawn alternately: this many of each at least, and more of them, up to the
+# larger number, for as long as they do not agree.
+FEWEST_REPETITIONS, MOST_REPETITIONS = 3, 9
 # A blurred image's time is that of its samples: so many are drawn, the rest is counted.
 BLUR_SAMPLES = 8
 # No further turn of an effect begins after its share of this.
 MOST_SECONDS = 60.0
+
+
+def difference(images, without):
+    """What an effect takes, from seconds of images with and without it, or None where they do not agree on it.
+
+    What else runs on the machine only ever makes an image slower, so the fastest of each kind are compared. They agree
+    where the fastest two of each kind lie nearer to each other than the two kinds do; an only pair is believed.
+    """
+    images, without = sorted(images), sorted(without)
+    noise = max(kind[:2][-1] - kind[0] for kind in (images, without))
+    found = images[0] - without[0]
+    return found if found > noise else None
 
 
 def start(scene, view):
@@ -77,14 +89,15 @@ def start(scene, view):
         run(everything)  # clouds are merged, memory is taken
         seconds = {}
         for done, effect in enumerate(measured):
-            differences = []
+            pairs, found = [], None
             begin = time.perf_counter()
-            while len(differences) < REPETITIONS and time.perf_counter() - begin < MOST_SECONDS / len(measured):
+            while len(pairs) < MOST_REPETITIONS and time.perf_counter() - begin < MOST_SECONDS / len(measured):
                 task.advance(done / len(measured), effects.NAMES[effect])
-                differences.append(run(everything) - run(without[effect], effect))
-            # What the repetitions do not agree on is the machine's, and not the effect's.
-            median, spread = statistics.median(differences), max(differences) - min(differences)
-            seconds[effect] = median if median > spread / 2 else 0.0
+                pairs.append((run(everything), run(without[effect], effect)))
+                found = difference(*zip(*pairs))
+                if found is not None and len(pairs) >= FEWEST_REPETITIONS:
+                    break
+            seconds[effect] = found or 0.0
         return seconds
 
     return Task(work)
