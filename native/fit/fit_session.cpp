@@ -74,7 +74,7 @@ ScaffoldModelOptions scaffoldOptions(const FitOptions& options) {
   return scaffold;
 }
 
-/// One key frame every so many whole frames, at least one.
+/// One key frame every so many whole frames, at least one, in the middle of the clip.
 KeyFrameClip keyFrameClip(const FitOptions& options, const ViewSource& views) {
   const MotionClip clip = clipOfViews(views);
   const double frames = std::round(options.key_frame_spacing * clip.frames_per_second);
@@ -83,6 +83,7 @@ KeyFrameClip keyFrameClip(const FitOptions& options, const ViewSource& views) {
   keys.frames_per_second = clip.frames_per_second;
   keys.frame_count = clip.frame_count;
   keys.spacing = static_cast<uint32_t>(std::clamp(frames, 1.0, double{1} * clip.frame_count));
+  keys.first_key = firstKeyOf(keys);
   keys.blend = options.key_frame_blend;
   return keys;
 }

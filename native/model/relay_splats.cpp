@@ -22,8 +22,12 @@ ScaffoldShape shapeOf(const RelayAssetHead& head) {
 }
 
 KeyFrameClip clipOf(const RelayAssetHead& head) {
-  return {head.begin, head.frames_per_second, head.frame_count, head.spacing,
-          static_cast<KeyFrameBlend>(head.blend)};
+  return {head.begin,
+          head.frames_per_second,
+          head.frame_count,
+          head.spacing,
+          static_cast<KeyFrameBlend>(head.blend),
+          head.first_key};
 }
 
 /// Key frames from a source, of which a few are at hand.
@@ -156,6 +160,7 @@ std::shared_ptr<const SplatModel> makeRelaySplats(const KeyFrameClip& clip,
   head.begin = clip.begin;
   head.frames_per_second = clip.frames_per_second;
   head.frame_count = clip.frame_count;
+  head.first_key = clip.first_key;
   head.spacing = clip.spacing;
   head.blend = static_cast<uint32_t>(clip.blend);
   head.settings_json = std::move(notes.settings_json);
@@ -190,10 +195,16 @@ std::shared_ptr<const SplatModel> makeRelaySplats(const KeyFrameClip& clip,
 std::shared_ptr<const SplatModel> readRelaySplats(const std::string& path, const ReadingAid&) {
   auto asset = std::make_shared<const RelayAsset>(path);
   const size_t count = asset->head().anchor_counts.size();
-  const uint32_t needed = clipOf(asset->head()).keyCount();
+  const KeyFrameClip clip = clipOf(asset->head());
+  const uint32_t needed = clip.keyCount();
   if (count != needed) {
     fail(ErrorCode::kFormat, path + " has " + std::to_string(count) +
                                  " key frames; of its frames it needs " + std::to_string(needed));
+  }
+  try {
+    validate(clip);
+  } catch (const Error& error) {
+    fail(ErrorCode::kFormat, path + ": " + error.what());
   }
   const KeyFrameSource frames =
       keptFrames([asset, path](uint32_t key) { return frameOfFile(*asset, path, key); });

@@ -8,7 +8,7 @@ import pytest
 from fit_dataset import TOOL, dataset, error, figures, run  # noqa: F401
 from test_motion import moving  # noqa: F401
 
-# Times 0 to 1 by 1/11 seconds: key frames at 0, 4/11 and 8/11.
+# Times 0 to 1 by 1/11 seconds: key frames at 1/11, 5/11 and 9/11.
 FEW = ('--model', 'relay', '--iterations', 150, '--max-anchors', 120, '--gaussians-per-anchor', 4, '--sh-degree', 0,
        '--key-frame-spacing', 0.36)
 

@@ -43,23 +43,36 @@ Apart apartOf(double tau, double offset, KeyFrameBlend blend) {
   return {std::abs(apart), apart > 0 ? -1.0 : apart < 0 ? 1.0 : 0.0};
 }
 
+/// From the first key frame to the last are so many frames less than from the first frame to the
+/// last.
+uint32_t framesBesideKeys(const KeyFrameClip& clip) {
+  return clip.frame_count - 1 - (clip.keyCount() - 1) * clip.spacing;
+}
+
 }  // namespace
 
 uint32_t KeyFrameClip::keyCount() const {
   return std::max<uint32_t>(1, (frame_count - 1 + spacing - 1) / spacing);
 }
 
+uint32_t firstKeyOf(const KeyFrameClip& clip) {
+  return framesBesideKeys(clip) / 2;
+}
+
 void validate(const KeyFrameClip& clip) {
   if (std::isfinite(clip.begin) && std::isfinite(clip.frames_per_second) &&
       clip.frames_per_second > 0 && clip.frame_count >= 1 && clip.frame_count <= kMostFrames &&
-      clip.spacing >= 1 && std::isfinite(clip.end()) && clip.blend <= KeyFrameBlend::kPlateau) {
+      clip.spacing >= 1 && std::isfinite(clip.end()) && clip.blend <= KeyFrameBlend::kPlateau &&
+      clip.first_key <= framesBesideKeys(clip)) {
     return;
   }
   fail(ErrorCode::kInvalidArgument,
        "the clip has " + std::to_string(clip.frame_count) + " frames at " +
            numberText(clip.frames_per_second) + " a second from " + numberText(clip.begin) +
-           " s and a key frame every " + std::to_string(clip.spacing) +
-           "; 1 to 16777216 frames, a rate above 0 and at least 1 frame between are needed");
+           " s and a key frame every " + std::to_string(clip.spacing) + " from frame " +
+           std::to_string(clip.first_key) +
+           " on; 1 to 16777216 frames, a rate above 0, at least 1 frame between and all key frames "
+           "within the clip are needed");
 }
 
 uint64_t mostAnchors(const KeyFrameClip& clip, std::span<const uint64_t> counts) {
@@ -77,9 +90,10 @@ KeyFramesAt keyFramesAt(const KeyFrameClip& clip, double seconds) {
   const double frame = std::clamp((held - clip.begin) * clip.frames_per_second, 0.0, last);
   const uint32_t keys = clip.keyCount();
   KeyFramesAt at;
-  at.key = std::min(static_cast<uint32_t>(frame / clip.spacing), keys - 1);
-  at.has_next = at.key + 1 < keys;
-  at.tau = (frame - double{1} * at.key * clip.spacing) / clip.spacing;
+  const double apart = (frame - clip.first_key) / clip.spacing;
+  at.key = std::min(static_cast<uint32_t>(std::max(0.0, apart)), keys - 1);
+  at.has_next = apart >= 0 && at.key + 1 < keys;
+  at.tau = apart - at.key;
   return at;
 }
 

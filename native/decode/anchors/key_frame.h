@@ -27,21 +27,26 @@ constexpr bool isLearned(KeyFrameBlend blend) {
   return blend == KeyFrameBlend::kLearned || blend == KeyFrameBlend::kPlateau;
 }
 
-/// The clip that key frames stand in: one at its first frame, then one every `spacing` frames.
+/// The clip that key frames stand in, one every `spacing` frames.
 struct KeyFrameClip {
   double begin = 0;              ///< seconds, of the first frame
   double frames_per_second = 1;  ///< > 0
   uint32_t frame_count = 1;
   uint32_t spacing = 1;  ///< frames, at least 1
   KeyFrameBlend blend = KeyFrameBlend::kLearned;
+  uint32_t first_key = 0;  ///< the frame of the first one
 
   double end() const { return begin + (frame_count - 1) / frames_per_second; }
-  /// At least one; no key frame is the last frame of the clip alone.
+  /// At least one: as few as there may be for none to go on alone for more than half of the
+  /// spacing, where they stand in the middle (firstKeyOf).
   uint32_t keyCount() const;
   double timeOf(uint32_t key) const {
-    return begin + double{1} * key * spacing / frames_per_second;
+    return begin + (first_key + double{1} * key * spacing) / frames_per_second;
   }
 };
+
+/// Where the first key frame stands for as many frames to be before it as behind the last.
+uint32_t firstKeyOf(const KeyFrameClip& clip);
 
 /// Errors: kInvalidArgument.
 void validate(const KeyFrameClip& clip);
@@ -52,9 +57,9 @@ uint64_t mostAnchors(const KeyFrameClip& clip, std::span<const uint64_t> counts)
 
 /// Which key frames show a time, held to the clip.
 struct KeyFramesAt {
-  uint32_t key = 0;       ///< n, the one before
-  bool has_next = false;  ///< n + 1 is there; else n goes on alone
-  double tau = 0;         ///< 0..1 from n to n + 1
+  uint32_t key = 0;       ///< n, the one before; before the first, that
+  bool has_next = false;  ///< n + 1 shows it, too; else n is alone
+  double tau = 0;         ///< 0..1 from n to n + 1; below 0 before the first
 };
 KeyFramesAt keyFramesAt(const KeyFrameClip& clip, double seconds);
 

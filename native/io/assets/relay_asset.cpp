@@ -85,6 +85,7 @@ void writeRelayAsset(const RelayAssetHead& head,
   file.setMetadata(kClip, Json({{"begin", head.begin},
                                 {"frames", head.frame_count},
                                 {"frames_per_second", head.frames_per_second},
+                                {"first_key", head.first_key},
                                 {"spacing", head.spacing},
                                 {"blend", head.blend}})
                               .dump());
@@ -119,6 +120,10 @@ RelayAsset::RelayAsset(const std::string& path)
   head_.begin = numberOf(clip, "begin", path);
   head_.frames_per_second = numberOf(clip, "frames_per_second", path);
   head_.frame_count = wholeOf(clip, "frames", 1, kMostFrames, path);
+  // Files of before 29 November 2026 have their first key frame at frame 0.
+  if (clip.contains("first_key")) {
+    head_.first_key = wholeOf(clip, "first_key", 0, kMostFrames, path);
+  }
   head_.spacing = wholeOf(clip, "spacing", 1, kMostFrames, path);
   head_.blend = wholeOf(clip, "blend", 0, 3, path);
   head_.anchor_counts = file_->readUint64s(kCounts, 1);

@@ -18,8 +18,9 @@ struct RelayAssetHead {
   double begin = 0;  ///< seconds
   double frames_per_second = 1;
   uint32_t frame_count = 1;
-  uint32_t spacing = 1;  ///< frames from one key frame to the next
-  uint32_t blend = 0;    ///< 0 learned, 1 linear, 2 none, 3 plateau
+  uint32_t first_key = 0;  ///< the frame of the first key frame
+  uint32_t spacing = 1;    ///< frames from one key frame to the next
+  uint32_t blend = 0;      ///< 0 learned, 1 linear, 2 none, 3 plateau
   uint32_t gaussians = 1;
   int sh_degree = 0;
   ColourSpace colour_space = ColourSpace::kDisplay;

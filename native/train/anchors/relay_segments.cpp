@@ -14,7 +14,8 @@ namespace {
 constexpr double kGlobalShare = 0.4;
 constexpr double kKeyFrameShare = 0.05;
 constexpr double kBlendShare = 0.05;
-/// A window draws a view at its key frame so often while it draws one at the next key frame once.
+/// A window draws a view at its key frame so often while it draws one at the next key frame once,
+/// and those that no other key frame shows as often.
 constexpr double kMostDraws = 4;
 /// A window begins with what is so near to its key frame, in units of the spacing, and reaches all
 /// that it has after this share of its steps.
@@ -24,6 +25,11 @@ constexpr double kReachesAllAt = 0.7;
 /// In units of the spacing.
 double distanceOf(double time, const RelaySegment& segment, const KeyFrameClip& clip) {
   return std::abs(time - clip.timeOf(segment.key)) * clip.frames_per_second / clip.spacing;
+}
+
+/// Whether no other key frame shows what is so far behind this one.
+bool isAlone(double apart, const RelaySegment& segment, const KeyFrameClip& clip) {
+  return (apart < 0 && segment.key == 0) || (apart > 0 && segment.key + 1 == clip.keyCount());
 }
 
 }  // namespace
@@ -79,8 +85,9 @@ std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameCl
   for (size_t v = 0; v < times.size(); ++v) {
     const double apart = times[v] - middle;
     if (apart >= -before && apart <= behind) {
-      const double draws =
-          is_window ? std::ceil(kMostDraws * (1 - distanceOf(times[v], segment, clip))) : 1;
+      const double nearness =
+          isAlone(apart, segment, clip) ? 1 : 1 - distanceOf(times[v], segment, clip);
+      const double draws = is_window ? std::ceil(kMostDraws * nearness) : 1;
       views.insert(views.end(), static_cast<size_t>(std::max(1.0, draws)), v);
     }
     nearest = std::min(nearest, std::abs(apart));

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -58,10 +60,41 @@ KeyFrame someFrame(size_t count, uint64_t seed, bool deforms) {
 TEST(KeyFrameClip, HasAKeyFrameAtItsBeginAndEverySpacing) {
   EXPECT_EQ(clipOf(1, 5).keyCount(), 1u);
   EXPECT_EQ(clipOf(5, 5).keyCount(), 1u) << "shorter than one spacing";
-  EXPECT_EQ(clipOf(6, 5).keyCount(), 1u) << "a key frame of the last frame alone shows nothing";
+  EXPECT_EQ(clipOf(6, 5).keyCount(), 1u) << "in its middle";
   EXPECT_EQ(clipOf(7, 5).keyCount(), 2u) << "a ragged last window";
   EXPECT_EQ(clipOf(480, 24).keyCount(), 20u);
   EXPECT_DOUBLE_EQ(clipOf(480, 24).timeOf(3), 2 + 7.2);
+}
+
+TEST(KeyFrameClip, HasAsManyFramesBeforeItsKeyFramesAsBehind) {
+  for (const auto& [frames, spacing, first] : std::initializer_list<std::array<uint32_t, 3>>{
+           {1, 5, 0}, {2, 5, 0}, {5, 5, 2}, {6, 5, 2}, {7, 5, 0}, {25, 8, 4}, {480, 24, 11}}) {
+    KeyFrameClip clip = clipOf(frames, spacing);
+    clip.first_key = firstKeyOf(clip);
+    EXPECT_EQ(clip.first_key, first) << frames;
+    EXPECT_NO_THROW(validate(clip)) << frames;
+    // None goes on alone for more than half of the spacing.
+    const double behind = (clip.end() - clip.timeOf(clip.keyCount() - 1)) * 10;
+    EXPECT_LE(first, spacing / 2.0) << frames;
+    EXPECT_LE(behind, (spacing + 1) / 2.0 + 1e-9) << frames;
+    clip.first_key = frames - (clip.keyCount() - 1) * spacing;
+    EXPECT_THROW(validate(clip), Error) << "the last is not in the clip of " << frames;
+  }
+}
+
+TEST(KeyFrameClip, OfOneThatStandsInItIsAloneOnBothSides) {
+  KeyFrameClip clip = clipOf(25, 8);
+  clip.first_key = firstKeyOf(clip);  // at frames 4, 12, 20
+  const auto at = [&](int frame) { return keyFramesAt(clip, 2 + 0.1 * frame); };
+  EXPECT_EQ(at(0).key, 0u);
+  EXPECT_FALSE(at(0).has_next);
+  EXPECT_NEAR(at(0).tau, -0.5, 1e-12);
+  EXPECT_TRUE(at(5).has_next);
+  EXPECT_NEAR(at(5).tau, 0.125, 1e-12);
+  EXPECT_EQ(at(13).key, 1u);
+  EXPECT_EQ(at(24).key, 2u);
+  EXPECT_FALSE(at(24).has_next);
+  EXPECT_NEAR(at(24).tau, 0.5, 1e-12);
 }
 
 TEST(KeyFrameClip, SaysWhichKeyFramesShowATime) {

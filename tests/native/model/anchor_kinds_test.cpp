@@ -88,6 +88,7 @@ TEST_F(AnchorKinds, ALongClipComesBackAtAnyTime) {
   clip.frames_per_second = 10;
   clip.frame_count = 26;
   clip.spacing = 8;
+  clip.first_key = 1;
   // Four key frames; more than are kept at hand of a file.
   const KeyFrameSource frames =
       sourceOf({someFrame(20, 1), someFrame(30, 2), someFrame(25, 3, 0.5), someFrame(10, 4)});
@@ -102,7 +103,7 @@ TEST_F(AnchorKinds, ALongClipComesBackAtAnyTime) {
   EXPECT_DOUBLE_EQ(settings.time->begin, 1);
   EXPECT_DOUBLE_EQ(settings.time->end, 3.5);
   EXPECT_FLOAT_EQ(seen->info().bounds_min[2], model->info().bounds_min[2]);
-  for (const double time : {0.0, 1.0, 1.37, 3.2, 1.2, 99.0}) {
+  for (const double time : {0.0, 1.0, 1.05, 1.37, 3.2, 1.2, 99.0}) {
     for (const uint64_t budget : {3, 60}) {
       ModelRequest request;
       request.budget = budget;
@@ -170,6 +171,10 @@ TEST_F(AnchorKinds, RefuseWhatDoesNotFitTogether) {
   clip.spacing = 8;
   expectError(ErrorCode::kInvalidArgument, {"1 key frames", "needs 4"},
               [&] { makeRelaySplats(clip, sourceOf({someFrame(20, 1)})); });
+  clip.first_key = 2;
+  expectError(ErrorCode::kInvalidArgument, {"from frame 2 on"},
+              [&] { makeRelaySplats(clip, sourceOf({someFrame(20, 1)})); });
+  clip.first_key = 0;
   clip.spacing = 100;
   expectError(ErrorCode::kInvalidArgument, {"0 anchors"},
               [&] { makeRelaySplats(clip, sourceOf({someFrame(0, 1)})); });

@@ -58,7 +58,8 @@ RelayModelOptions smallOptions(uint64_t iterations) {
   options.anchors.gaussians_per_anchor = 4;
   options.anchors.antialias = Antialias::kMip;
   options.anchors.seed = 1;
-  options.clip = clipOf(kFrames, 6, KeyFrameBlend::kLearned);  // key frames 0 and 6
+  options.clip = clipOf(kFrames, 6, KeyFrameBlend::kLearned);
+  options.clip.first_key = firstKeyOf(options.clip);  // key frames 3 and 9
   options.iterations = iterations;
   return options;
 }
@@ -182,6 +183,22 @@ TEST(RelaySegments, WindowsReachFurtherWithEveryStep) {
   EXPECT_EQ(viewsInReach(window, clip, times, few, 0.0), 1u);
 }
 
+TEST(RelaySegments, WhatOneKeyFrameShowsAloneCountsAlike) {
+  KeyFrameClip clip = clipOf(25, 8, KeyFrameBlend::kLearned);
+  clip.first_key = 4;
+  std::vector<double> times;
+  for (int frame = 0; frame < 25; ++frame) times.push_back(0.1 * frame);
+  const auto draws = [&](uint32_t key, size_t view) {
+    const auto views = viewsOfSegment({RelayStage::kWindow, key, 0, 1}, clip, times);
+    return std::count(views.begin(), views.end(), view);
+  };
+  EXPECT_EQ(draws(0, 0), 4);
+  EXPECT_EQ(draws(0, 9), 2);
+  EXPECT_EQ(draws(1, 4), 1);
+  EXPECT_EQ(draws(2, 24), 4);
+  EXPECT_EQ(draws(2, 15), 2);
+}
+
 TEST(RelaySegments, LevelsFollowHowVariedFeaturesAre) {
   std::vector<float> features(10 * kScaffoldFeatures, 0.0f);
   for (size_t a = 0; a < 10; ++a) {
@@ -191,6 +208,19 @@ TEST(RelaySegments, LevelsFollowHowVariedFeaturesAre) {
   // All alike: by their order.
   EXPECT_THAT(levelsOfFeatures(features, {0.9, 1.0}), ElementsAre(1, 0, 0, 0, 0, 0, 0, 0, 0, 0));
   EXPECT_THAT(levelsOfFeatures(std::vector<float>(64, 0.5f), {0.5, 0.8}), ElementsAre(0, 1));
+}
+
+/// Of the held-out camera's image at a frame, dB.
+double psnrAt(Fit& fit, uint32_t frame) {
+  const auto shown = toyViews(fit.model->splatsAt(0, 0.1 * frame), kCameras, kSize);
+  const std::vector<float> seen = shown->load(kCameras - 1).colour;
+  const std::vector<float> truth = fit.views->load(frame * kCameras + kCameras - 1).colour;
+  double sum = 0;
+  for (size_t i = 0; i < seen.size(); ++i) {
+    const double apart = static_cast<double>(seen[i]) - static_cast<double>(truth[i]);
+    sum += apart * apart;
+  }
+  return -10 * std::log10(sum / static_cast<double>(seen.size()));
 }
 
 TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
@@ -211,8 +241,9 @@ TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
   at_rest.run(observer, nullptr);
   const double moving = fit.trainer->history().by_budget.back().psnr;
   const double resting = at_rest.history().by_budget.back().psnr;
-  // 29.7 and 21.1 dB.
+  // 29.0 and 21.1 dB.
   EXPECT_GT(moving, resting + 6);
+  for (uint32_t f = 0; f < kFrames; ++f) std::printf("XX %u %f\n", f, psnrAt(fit, f));
   // Every part was written once: all of the clip, two key frames, two windows, a pair.
   EXPECT_THAT(fit.store->names, ElementsAre("global", "key0.stage2", "key1.stage2", "key0.stage3",
                                             "key1.stage3", "pair0.stage4"));
@@ -225,7 +256,7 @@ TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
   EXPECT_EQ(source(0)->scaffold.coarsening, 0.5);
   const auto& budgets = fit.trainer->history().by_budget;
   ASSERT_EQ(budgets.size(), 3u);
-  EXPECT_GT(budgets[1].psnr, moving - 3.5) << "2.4 dB less";
+  EXPECT_GT(budgets[1].psnr, moving - 3.5) << "1.6 dB less";
 }
 
 TEST(RelayModel, EachStageStartsWhereTheLastEnded) {
@@ -279,7 +310,7 @@ TEST(RelayModel, GoesOnBitForBitFromEveryStage) {
   whole.trainer->run(whole.observer, nullptr);
   const SplatCloud wanted = whole.model->splatsAt(0, 0.35);
   // Inside the global stage, a key frame, a window and a pair.
-  for (const uint64_t stop : {31, 65, 121, 190}) {
+  for (const uint64_t stop : {31, 85, 121, 195}) {
     auto store = std::make_shared<CountingStore>();
     Fit half(options, stop, store);
     half.trainer->run(half.observer, nullptr);

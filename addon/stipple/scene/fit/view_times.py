@@ -105,12 +105,15 @@ def seconds_at(scene, frame, start):
 
 def key_frame_seconds(times, spacing):
     """Seconds from the first of these times, ascending, at which the key frames of a long shot stand: every so many
-    whole times, and none at the last alone."""
+    whole times, in the middle of all."""
     if len(times) < 2:
         return (0.0,)
     step = (times[-1] - times[0]) / (len(times) - 1)
     every = min(max(1, math.floor(spacing / step + 0.5)), len(times))
-    return tuple(i * step for i in range(0, len(times) - 1, every))
+    last = len(times) - 1
+    count = -(-last // every)
+    first = (last - (count - 1) * every) // 2
+    return tuple((first + i * every) * step for i in range(count))
 
 
 def evenly(items, most):
