@@ -25,6 +25,11 @@ def model(moving, tmp_path_factory):  # noqa: F811
     return path
 
 
+def header_of(path):
+    data = path.read_bytes()
+    return json.loads(data[8:8 + int.from_bytes(data[:8], 'little')])
+
+
 def splats_of(path):
     return json.loads(run('info', path, '--json').stdout)['count']
 
@@ -32,6 +37,8 @@ def splats_of(path):
 def test_a_fit_is_a_model_with_times_and_budgets(model, tmp_path):
     info = json.loads(run('info', model, '--json').stdout)
     assert info['kind'] == 'key frames of anchors'
+    clip = json.loads(header_of(model)['__metadata__']['clip'])
+    assert (clip['frames'], clip['spacing'], clip['first_key']) == (12, 4, 1)  # one frame before them, two behind
     assert (info['time_begin'], info['time_end']) == (0, 1)
     for name, seconds, anchors in (('begin', 0, 60), ('again', -7, 60), ('middle', 0.5, 60), ('few', 0.5, 20)):
         run('decode', model, tmp_path / f'{name}.ply', '--time', seconds, '--anchors', anchors)

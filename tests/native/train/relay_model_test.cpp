@@ -243,7 +243,9 @@ TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
   const double resting = at_rest.history().by_budget.back().psnr;
   // 29.0 and 21.1 dB.
   EXPECT_GT(moving, resting + 6);
-  for (uint32_t f = 0; f < kFrames; ++f) std::printf("XX %u %f\n", f, psnrAt(fit, f));
+  // Where one key frame is alone: 29.0 and 27.5 dB.
+  EXPECT_GT(psnrAt(fit, 0), moving - 3);
+  EXPECT_GT(psnrAt(fit, kFrames - 1), moving - 3);
   // Every part was written once: all of the clip, two key frames, two windows, a pair.
   EXPECT_THAT(fit.store->names, ElementsAre("global", "key0.stage2", "key1.stage2", "key0.stage3",
                                             "key1.stage3", "pair0.stage4"));
