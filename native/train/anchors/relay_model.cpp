@@ -130,6 +130,7 @@ class RelayModel final : public FitModel {
     putValues("relay.anchor_counts", counts, table);
     putValues("relay.steps", std::vector<uint64_t>{steps_, entered_ ? *entered_ + 1 : uint64_t{0}},
               table);
+    putValues("relay.first_key", std::vector<uint64_t>{options_.clip.first_key}, table);
     return table;
   }
 
@@ -137,6 +138,12 @@ class RelayModel final : public FitModel {
     const auto at = takeValues<uint64_t>(table, "relay.steps", 2, 2);
     if (at[0] > options_.iterations + segments().size() || at[1] > segments().size()) {
       fail(ErrorCode::kFormat, "the checkpoint is of a fit of another length");
+    }
+    // Until 29 November 2026 it was frame 0, and checkpoints did not say so.
+    if (!table.contains("relay.first_key") ||
+        takeValues<uint64_t>(table, "relay.first_key", 1, 1)[0] != options_.clip.first_key) {
+      fail(ErrorCode::kFormat,
+           "the checkpoint is of a fit whose key frames stand at other frames; it cannot go on");
     }
     RelayWork work = workOf(table, work_);
     anchor_counts_ = takeValues<uint64_t>(table, "relay.anchor_counts", anchor_counts_.size(),

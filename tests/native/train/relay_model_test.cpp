@@ -327,6 +327,21 @@ TEST(RelayModel, GoesOnBitForBitFromEveryStage) {
   }
 }
 
+TEST(RelayModel, RefusesACheckpointOfOtherKeyFrames) {
+  RelayModelOptions options = smallOptions(200);
+  Fit half(options, 31);
+  half.trainer->run(half.observer, nullptr);
+  options.clip.first_key = 0;
+  Fit elsewhere(options);
+  try {
+    elsewhere.trainer->restore(half.observer.saved);
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kFormat);
+    EXPECT_THAT(error.what(), testing::HasSubstr("key frames stand at other frames"));
+  }
+}
+
 TEST(RelayModel, SaysWhichKeyFrameIsMissing) {
   const RelayModelOptions options = smallOptions(200);
   Fit half(options, 121);
