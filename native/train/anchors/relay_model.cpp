@@ -143,7 +143,8 @@ class RelayModel final : public FitModel {
     if (!table.contains("relay.first_key") ||
         takeValues<uint64_t>(table, "relay.first_key", 1, 1)[0] != options_.clip.first_key) {
       fail(ErrorCode::kFormat,
-           "the checkpoint is of a fit whose key frames stand at other frames; it cannot go on");
+           "the checkpoint is of a fit whose key frames stand at other frames; remove it to begin "
+           "anew");
     }
     RelayWork work = workOf(table, work_);
     anchor_counts_ = takeValues<uint64_t>(table, "relay.anchor_counts", anchor_counts_.size(),
