@@ -34,6 +34,12 @@ std::vector<float> anchorSpacing(const AnchorSet& anchors) {
   return anchorSpacing(anchors, neighbours);
 }
 
+std::vector<float> spacingUnits(const AnchorSet& anchors, float side) {
+  std::vector<float> units = anchorSpacing(anchors);
+  for (float& unit : units) unit /= side;
+  return units;
+}
+
 std::vector<float> anchorSpacing(const AnchorSet& anchors, std::vector<uint32_t>& neighbours) {
   const size_t count = anchors.size();
   const double leaf = std::ldexp(1.0, -anchors.leaf_level);

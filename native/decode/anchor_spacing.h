@@ -19,5 +19,11 @@ std::vector<float> anchorSpacing(const AnchorSet& anchors);
 /// anchors, kNoPlace (decode/tree/merge_neighbours.h) where there are fewer.
 constexpr size_t kSpacingNeighbours = 6;
 std::vector<float> anchorSpacing(const AnchorSet& anchors, std::vector<uint32_t>& neighbours);
+/// Bytes that it holds for each anchor: places as double and float, a tree, neighbours.
+constexpr uint64_t kSpacingBytes = 3 * 12 + 64 + 7 * sizeof(uint32_t);
+
+/// The same as units of SplatLayout: splats are then as large as their anchors stand apart.
+/// In: side, > 0, of the lattice that the splats of a unit of 1 fill.
+std::vector<float> spacingUnits(const AnchorSet& anchors, float side);
 
 }  // namespace stipple

@@ -4,12 +4,17 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ball_collection import config, objects, write_ball, write_png  # noqa: F401
 from fit_dataset import TOOL, error, run
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import pipeline_weights  # noqa: E402
 
 
 @pytest.fixture
@@ -329,7 +334,21 @@ def test_a_flow_begins_with_networks_that_are_there(given, tmp_path):
     path.write_text(json.dumps({**fields, 'out': 'third', 'parts': parts(attributes=60), 'flow': {}}))
     seen = json.loads(run('train', path, '--json').stdout)
     assert seen['steps'] == 60 and seen['held_out_psnr_128_anchors'] > before['by_budget'][-1]['psnr'] - 0.5
+    # So that a flow stays right, its latents may be kept, bit for bit; decoders are learned further all the same.
+    kept = [dict(part, keeps_encoder=1) for part in parts(attributes=60)]
+    path.write_text(json.dumps({**fields, 'out': 'kept', 'parts': kept, 'flow': {}}))
+    run('train', path)
+    latents, encoders = [], []
+    for name in ('first', 'third', 'kept'):
+        encoders.append(pipeline_weights.read(tmp_path / name / 'weights.safetensors'))
+        run('encode', tmp_path / name / 'weights.safetensors', tmp_path / 'objects/balls/2', tmp_path / 'x.safetensors')
+        latents.append(pipeline_weights.read(tmp_path / 'x.safetensors')['latent.tokens'])
+    assert latents[0] == latents[2] != latents[1]
+    changed = [name for name in encoders[0] if encoders[0][name] != encoders[2][name]]
+    assert len(changed) > 20 and not [name for name in changed if name.startswith('encoder.')]
     for changes, message in (({'flow': {}}, 'the flow alone is learned'),
+                             ({'parts': [dict(kept[0], weight_decay=0.1)]}, 'the weight decay is 0.1'),
+                             ({'parts': [dict(kept[0], keeps_encoder=2)]}, "'parts.0.keeps_encoder' is 2"),
                              ({'network': {'heads': 2}}, '"network" and "start" are both given'),
                              ({'start': 'nothing.safetensors'}, 'nothing.safetensors'),
                              ({'start': 'objects/balls/0/points.ply'}, 'points.ply')):

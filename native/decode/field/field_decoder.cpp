@@ -147,9 +147,7 @@ uint64_t FieldDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per
   uint64_t floats = 2 + fieldInputWidth(*field_);
   for (const LinearLayer& layer : field_->network.layers()) floats += 2 * layer.outputs;
   floats -= field_->network.layers().back().outputs;
-  // The search for neighbours: places as double and float, a tree, six numbers.
-  const uint64_t spacing = 3 * 12 + 64 + 7 * sizeof(uint32_t);
-  const uint64_t anchor = floats * sizeof(float) + spacing;
+  const uint64_t anchor = floats * sizeof(float) + kSpacingBytes;
   return anchor_count * (anchor + gaussians_per_anchor * gaussian) + (uint64_t{1} << 20);
 }
 

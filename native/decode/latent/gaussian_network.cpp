@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "nn/activations.h"
 #include "nn/norms.h"
 
@@ -32,6 +33,16 @@ uint32_t readGaussians(const WeightTable& network) {
                                  std::to_string(kMostGaussians) + " can be decoded");
   }
   return static_cast<uint32_t>(count);
+}
+
+/// 0 where the file has none, as the published one.
+float readSpacingUnit(const WeightTable& network) {
+  constexpr char kUnit[] = "spacing_unit";
+  if (!network.has(kUnit)) return 0;
+  const float unit = network.floats(kUnit, {1}).front();
+  if (unit > 0 && unit <= 1) return unit;
+  fail(ErrorCode::kFormat, network.source() + ": " + kUnit + " is " + numberText(unit) +
+                               "; more than 0, and 1 at most, is allowed");
 }
 
 /// Multiplications of the attention to a latent for each number of a token, of which rows and
@@ -67,6 +78,7 @@ GaussianNetwork::GaussianNetwork(const WeightTable& network)
   out_ = Linear(network, "out_proj", width, kGaussianOutputs * gaussians_);
   lattice_ = network.floats("points_offset_perturbation", {gaussians_, 3});
   spread_bias_ = network.floats("base_offset_scale", {1}).front();
+  spacing_unit_ = readSpacingUnit(network);
   const size_t count = network.countBlocks("blocks.");
   for (size_t i = 0; i < count; ++i) {
     const WeightTable block = network.under("blocks." + std::to_string(i) + ".");

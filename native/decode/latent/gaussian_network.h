@@ -23,6 +23,9 @@ class GaussianNetwork {
   const std::vector<float>& lattice() const { return lattice_; }
   /// What is added to raw spreads.
   float spreadBias() const { return spread_bias_; }
+  /// Lengths are multiples of how far apart anchors stand over this, in the unit cube; 0: they are
+  /// in the unit of the published network, whatever the budget is.
+  float spacingUnit() const { return spacing_unit_; }
   const std::string& source() const { return source_; }
 
   /// What anchors see of a latent. Errors: kInvalidArgument for one that requireLatent() refuses;
@@ -53,6 +56,7 @@ class GaussianNetwork {
   uint32_t gaussians_ = 0;
   std::vector<float> lattice_;
   float spread_bias_ = 0;
+  float spacing_unit_ = 0;
 };
 
 }  // namespace stipple

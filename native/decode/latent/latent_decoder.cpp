@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "decode/anchor_spacing.h"
 #include "decode/splat_layout.h"
 
 namespace stipple {
@@ -38,22 +39,24 @@ SplatCloud LatentDecoder::decode(const DecodeRequest& request) const {
   const auto keys = keys_.get([&] { return network_->keysOf(run, *latent_); });
   const std::vector<float> features =
       network_->features(run, *keys, anchors.size(), anchors.positions.data());
-  SplatCloud cloud = splatsOf(anchors.positions, features);
+  SplatCloud cloud = splatsOf(anchors, features);
   place(latent_->placement, cloud);
   advance(request.progress, 1.0, "Decoding splats");
   return cloud;
 }
 
-SplatCloud LatentDecoder::splatsOf(std::span<const float> points,
+SplatCloud LatentDecoder::splatsOf(const AnchorSet& anchors,
                                    std::span<const float> features) const {
   const SplatLayout layout = {network_->gaussians(), 0};
-  // Lengths are in DeG's own unit, whatever the budget is.
-  const std::vector<float> units(points.size() / 3, 1.0f);
+  const float side = network_->spacingUnit();
+  const std::vector<float> units =
+      side > 0 ? spacingUnits(anchors, side) : std::vector<float>(anchors.size(), 1.0f);
   const SplatBiases biases = {network_->lattice(), network_->spreadBias()};
   SplatCloud cloud;
   cloud.frame = Frame::kRFU;
   cloud.antialias = Antialias::kMip;
-  activateSplats(layout, {points, units}, features.data(), layout.outputs(), cloud, &biases);
+  activateSplats(layout, {anchors.positions, units}, features.data(), layout.outputs(), cloud,
+                 &biases);
   parallelFor(cloud.positions.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) cloud.positions[i] -= kMiddle;
   });
@@ -66,8 +69,9 @@ uint64_t LatentDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_pe
   const uint64_t splats = anchor_count * (gaussians_per_anchor * kSplat + sizeof(float));
   // Packed weights and tiles of scores of each thread.
   constexpr uint64_t kLayers = uint64_t{64} << 20;
-  return network_->keyBytes(latent_->token_count) + network_->memoryBound(anchor_count) + splats +
-         kLayers;
+  const uint64_t spacing = network_->spacingUnit() > 0 ? anchor_count * kSpacingBytes : 0;
+  return network_->keyBytes(latent_->token_count) + spacing + network_->memoryBound(anchor_count) +
+         splats + kLayers;
 }
 
 void place(const LatentPlacement& placement, SplatCloud& cloud) {

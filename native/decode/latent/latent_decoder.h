@@ -25,9 +25,9 @@ class LatentDecoder final : public Decoder {
   SplatCloud decode(const DecodeRequest& request) const override;
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
-  /// What decode() does behind the network, without the placement. In: points [rows,3] in the unit
-  /// cube; features, as the network returns them.
-  SplatCloud splatsOf(std::span<const float> points, std::span<const float> features) const;
+  /// What decode() does behind the network, without the placement. In: features, as the network
+  /// returns them.
+  SplatCloud splatsOf(const AnchorSet& anchors, std::span<const float> features) const;
 
  private:
   std::shared_ptr<const GaussianNetwork> network_;

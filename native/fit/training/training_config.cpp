@@ -121,6 +121,8 @@ void addNetwork(AutoencoderSizes& sizes, std::vector<Setting>& list) {
   list.push_back(number("network.splat_blocks", sizes.splat_blocks));
   list.push_back(number("network.gaussians", sizes.gaussians));
   list.push_back(number("network.leaf_level", sizes.leaf_level));
+  const auto follows = [&sizes] { return sizes.follows_spacing; };
+  list.push_back(keptWhere(follows, number("network.follows_spacing", sizes.follows_spacing)));
 }
 
 /// In: precision, which decides what scale of losses is usual.
@@ -199,6 +201,8 @@ void addPart(const std::string& at, const FactorPrecision& precision, Autoencode
   list.push_back(number(at + "most_anchors", part.most_anchors));
   list.push_back(number(at + "views", part.views));
   list.push_back(number(at + "surface", part.surface));
+  const auto keeps = [&part] { return part.keeps_encoder; };
+  list.push_back(keptWhere(keeps, number(at + "keeps_encoder", part.keeps_encoder)));
   addOptimiser(at, precision, optimiser, list);
   list.push_back(number(at + "weights.structure", weights.structure));
   list.push_back(number(at + "weights.divergence", weights.divergence));

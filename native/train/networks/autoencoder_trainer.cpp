@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/random.h"
 #include "train/networks/trainer_tensors.h"
 
@@ -64,6 +65,10 @@ void validate(const AutoencoderSchedule& schedule) {
   requireCount(schedule.most_anchors, schedule.least_anchors, uint64_t{1} << 20, "anchors at most");
   requireCount(schedule.views, 1, 4096, "views of an object");
   requireCount(schedule.surface, 1, uint64_t{1} << 24, "points of the surface");
+  if (schedule.keeps_encoder && schedule.optimiser.weight_decay > 0) {
+    refuse("the weight decay is " + numberText(schedule.optimiser.weight_decay) +
+           "; 0 is allowed where the encoder is kept");
+  }
 }
 
 AutoencoderTrainer::AutoencoderTrainer(const AutoencoderSizes& sizes,
@@ -117,6 +122,7 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
                             static_cast<double>(part.most_anchors - part.least_anchors + 1));
   example.views = part.views;
   example.surface = part.surface;
+  example.keeps_encoder = part.keeps_encoder;
   const double share = 1 / static_cast<double>(part.batch);
   example.share = share * optimiser_->lossScale();
   AutoencoderStep done;

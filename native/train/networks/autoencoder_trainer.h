@@ -31,7 +31,8 @@ struct AutoencoderSchedule {
   uint64_t least_anchors = 256;  ///< drawn evenly from here
   uint64_t most_anchors = 256;   ///< to here
   size_t views = 4;
-  size_t surface = 8192;  ///< points of an object that tell the density of its surface
+  size_t surface = 8192;       ///< points of an object that tell the density of its surface
+  bool keeps_encoder = false;  ///< so that latents, and a flow of them, stay as they are
   AutoencoderLossWeights weights;
   WeightOptimiserOptions optimiser;  ///< its total_steps are the steps of this part
 };

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "decode/anchor_spacing.h"
 #include "decode/latent/latent_density.h"
 #include "decode/splat_layout.h"
 #include "density/anchor_sampling.h"
@@ -122,6 +123,9 @@ TensorTable DensityAutoencoder::tensors(std::span<const float> values) const {
   }
   table["gs.points_offset_perturbation"] = {{sizes_.gaussians, 3}, usualLattice(sizes_.gaussians)};
   table["gs.base_offset_scale"] = {{1}, std::vector<float>{usualSpread()}};
+  if (sizes_.follows_spacing) {
+    table["gs.spacing_unit"] = {{1}, std::vector<float>{static_cast<float>(kLatticeSide)}};
+  }
   return table;
 }
 
@@ -163,7 +167,8 @@ DensityAutoencoder::Splats DensityAutoencoder::splatsOf(std::span<const float> v
   Splats made;
   const SampledDensity density(octree_, values, latent, sizes_.leaf_level);
   made.anchors = sampleAnchors(density, {.count = anchors, .seed = seed});
-  made.units.assign(made.anchors.size(), 1.0f);
+  made.units = sizes_.follows_spacing ? spacingUnits(made.anchors, static_cast<float>(kLatticeSide))
+                                      : std::vector<float>(made.anchors.size(), 1.0f);
   made.raw = splats_.forward(values, latent, made.anchors.size(), made.anchors.positions.data(),
                              made.tape);
   const SplatLayout layout = {sizes_.gaussians, 0};
@@ -286,6 +291,7 @@ AutoencoderLosses DensityAutoencoder::addExample(std::span<const float> values,
     addImages(values, example, weights, backends, latent, gradients, by_latent.data(), losses,
               progress);
   }
+  if (example.keeps_encoder) return losses;
   drawLatentBackward(encoded, noise, by_latent, by);
   const std::vector<float*> nobody(points.size(), nullptr);
   encoder_.backward(values, points, tape, by, gradients, nobody);

@@ -28,6 +28,9 @@ struct AutoencoderSizes {
   std::vector<size_t> feature_widths = {3};  ///< of one or two kinds
   uint32_t gaussians = 8;                    ///< of each anchor, 4 to 32
   int leaf_level = 8;                        ///< 1 to kMaxLeafLevel
+  /// Lengths of splats are multiples of how far apart anchors stand, as in fields; false: in one
+  /// unit, whatever the budget is, as published.
+  bool follows_spacing = false;
 };
 
 /// Errors: kInvalidArgument with the number, its value and what is allowed.
@@ -93,7 +96,8 @@ struct AutoencoderExample {
   size_t surface =
       8192;           ///< points of the surface that tell the density, drawn where there are more
   uint64_t seed = 0;  ///< of noise, anchors, views and backgrounds
-  double share = 1;   ///< of the step: one over its examples, times the scale of its loss
+  bool keeps_encoder = false;  ///< nothing is learned by it: latents stay as they are
+  double share = 1;            ///< of the step: one over its examples, times the scale of its loss
 };
 
 /// What an example lost, without weights.

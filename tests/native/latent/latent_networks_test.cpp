@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <limits>
 
 #include "base/error.h"
 #include "latent/tiny_latent.h"
@@ -87,6 +88,19 @@ TEST(LatentNetworks, NamesATensorOfAnotherShape) {
         tensors.at("gs.blocks.1.cross_attn.to_kv.weight").shape = {192, 8};
       }),
       AllOf(HasSubstr("gs.blocks.1.cross_attn.to_kv.weight"), HasSubstr("8"), HasSubstr("16")));
+}
+
+TEST(LatentNetworks, NamesAUnitOfLengthsThatIsNone) {
+  for (const float unit : {0.0f, -0.05f, 2.0f, std::numeric_limits<float>::quiet_NaN()}) {
+    EXPECT_THAT(refusal([&](auto& tensors) {
+                  WeightTensor tensor = tensors.at("gs.base_offset_scale");
+                  tensor.type = WeightType::kFloat32;
+                  tensor.shape = {1};
+                  tensor.bytes = reinterpret_cast<const uint8_t*>(&unit);
+                  tensors["gs.spacing_unit"] = tensor;
+                }),
+                AllOf(HasSubstr("lying.safetensors"), HasSubstr("spacing_unit")));
+  }
 }
 
 TEST(LatentNetworks, NamesATensorThatIsOfNoFloatingPointType) {

@@ -98,6 +98,37 @@ TEST(AutoencoderTrainer, GoesOnBitForBitFromWhereverItWasStopped) {
   }
 }
 
+TEST(AutoencoderTrainer, KeepsTheEncoderWhereItIsAskedTo) {
+  const auto objects = std::make_shared<AskedBalls>(2);
+  std::vector<AutoencoderSchedule> parts = {partOf(AutoencoderStage::kAttributes, 4),
+                                            partOf(AutoencoderStage::kJoint, 6)};
+  parts[1].keeps_encoder = true;
+  AutoencoderTrainer trainer = trainerOf(objects, parts);
+  while (trainer.part() == 0) trainer.step();
+  const std::vector<float> before = trainer.values();
+  const std::shared_ptr<const TrainingObject> object = objects->object(1);
+  const std::vector<float> latent = trainer.networks().encode(before, *object, 24);
+  while (!trainer.isDone()) trainer.step();
+  size_t kept = 0, learned = 0;
+  for (const Parameter& parameter : trainer.networks().layout().parameters()) {
+    const auto first = static_cast<long>(parameter.first);
+    const auto end = static_cast<long>(parameter.first + parameter.count);
+    const bool is_same =
+        std::equal(before.begin() + first, before.begin() + end, trainer.values().begin() + first);
+    const bool is_of_encoder = parameter.name.rfind("encoder.", 0) == 0;
+    EXPECT_TRUE(is_same || !is_of_encoder) << parameter.name;
+    kept += is_of_encoder;
+    learned += !is_same;
+  }
+  EXPECT_GT(kept, 10u);
+  EXPECT_GT(learned, 20u);
+  // Its mean over steps is the same number, too.
+  EXPECT_EQ(trainer.networks().encode(trainer.meanValues(), *object, 24), latent);
+
+  parts[1].optimiser.weight_decay = 0.1;
+  EXPECT_THROW(trainerOf(objects, parts), Error);
+}
+
 TEST(AutoencoderTrainer, ALossThatIsNotFiniteIsSkippedAndCounted) {
   const auto objects = std::make_shared<AskedBalls>(2);
   objects->at(1).features[0][5] = std::numeric_limits<float>::quiet_NaN();

@@ -242,8 +242,11 @@ WeightTable tableOf(const TensorTable& tensors) {
   return {"trained", std::move(found), nullptr};
 }
 
-TEST(DensityAutoencoder, ItsTensorsAreReadByTheNetworksThatDecodeLatents) {
-  const DensityAutoencoder networks(smallSizes());
+/// In: follows_spacing, of the sizes.
+void expectTensorsAreRead(bool follows_spacing) {
+  AutoencoderSizes sizes = smallSizes();
+  sizes.follows_spacing = follows_spacing;
+  const DensityAutoencoder networks(sizes);
   std::vector<float> values = networks.startValues(4);
   for (size_t i = 0; i < values.size(); ++i) {  // also what is silent at the start
     values[i] += 0.05f * static_cast<float>(unitDouble(mixBits(i)) - 0.5);
@@ -270,6 +273,30 @@ TEST(DensityAutoencoder, ItsTensorsAreReadByTheNetworksThatDecodeLatents) {
     most = std::max(most, static_cast<double>(std::abs(cloud.scales[i] - own.scales[i])));
   }
   EXPECT_LT(most, 2e-5);  // Sums have another order.
+}
+
+TEST(DensityAutoencoder, ItsTensorsAreReadByTheNetworksThatDecodeLatents) {
+  expectTensorsAreRead(false);
+  expectTensorsAreRead(true);
+}
+
+TEST(DensityAutoencoder, ItsSplatsAreAsLargeAsTheirAnchorsStandApart) {
+  AutoencoderSizes sizes = smallSizes();
+  const TrainingObject object = ball();
+  const auto meanScale = [&](uint64_t anchors) {
+    const DensityAutoencoder networks(sizes);
+    const std::vector<float> values = networks.startValues(1);
+    const SplatCloud cloud =
+        networks.decode(values, networks.encode(values, object, 24), anchors, 3);
+    double sum = 0;
+    for (const float scale : cloud.scales) sum += static_cast<double>(scale);
+    return sum / static_cast<double>(cloud.scales.size());
+  };
+  EXPECT_NEAR(meanScale(64), meanScale(512), 1e-6);  // the published unit
+  sizes.follows_spacing = true;
+  // The density is that of a volume at first: eight times as many anchors stand half as far apart,
+  // and the cube's sides, where neighbours are missing, are 1.3 spacings of 64 wide.
+  EXPECT_NEAR(meanScale(64) / meanScale(512), 2, 0.15);
 }
 
 }  // namespace
