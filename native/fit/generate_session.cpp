@@ -43,11 +43,10 @@ FlowSettings flowSettings(const GenerateOptions& options) {
   return {options.steps, options.guidance, options.shift};
 }
 
-/// What the file of a flow network says of its training here; empty of the published one.
-std::string trainedSettings(const std::string& path) {
+std::map<std::string, std::string> metadataOf(const std::string& path) {
   std::map<std::string, std::string> metadata;
   openWeightFile(path, &metadata);
-  return metadata[kTrainedKey];
+  return metadata;
 }
 
 /// The networks up to the latent. What is large stays in their files.
@@ -80,13 +79,14 @@ struct Networks {
   const std::string& pathOf(WeightsRole role) const { return requireWeights(folder, role).path; }
   std::optional<TrainingConfig> trainedConfig() const {
     const std::string& path = pathOf(WeightsRole::kFlow);
-    const std::string settings = trainedSettings(path);
-    if (settings != trainedSettings(pathOf(WeightsRole::kDecoder))) {
+    const std::map<std::string, std::string> metadata = metadataOf(path);
+    if (latentsOf(metadata) != latentsOf(metadataOf(pathOf(WeightsRole::kDecoder)))) {
       fail(ErrorCode::kFormat, "the files of weights do not fit together: " + path + " and " +
                                    pathOf(WeightsRole::kDecoder) + " are of different trainings");
     }
-    if (settings.empty()) return std::nullopt;
-    return readSettings(settings, path);
+    const auto settings = metadata.find(kTrainedKey);
+    if (settings == metadata.end()) return std::nullopt;
+    return readSettings(settings->second, path);
   }
   /// Networks that were trained here see images as they saw them there, and say no more tokens than
   /// they learned.

@@ -28,6 +28,7 @@ constexpr double kLargestWhole = 9007199254740992.0;
   fail(ErrorCode::kInvalidArgument, message);
 }
 
+constexpr char kSpacingKey[] = "network.follows_spacing";
 constexpr const char* kStageNames[] = {"structure", "attributes", "joint"};
 constexpr const char* kPrecisionNames[] = {"float32", "bfloat16"};
 constexpr const char* kLossScalingNames[] = {"none", "dynamic"};
@@ -122,7 +123,7 @@ void addNetwork(AutoencoderSizes& sizes, std::vector<Setting>& list) {
   list.push_back(number("network.gaussians", sizes.gaussians));
   list.push_back(number("network.leaf_level", sizes.leaf_level));
   const auto follows = [&sizes] { return sizes.follows_spacing; };
-  list.push_back(keptWhere(follows, number("network.follows_spacing", sizes.follows_spacing)));
+  list.push_back(keptWhere(follows, number(kSpacingKey, sizes.follows_spacing)));
 }
 
 /// In: precision, which decides what scale of losses is usual.
@@ -346,7 +347,10 @@ void setAll(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
                        [&](const auto& entry) { return entry.first.rfind(begin, 0) == 0; });
   };
   config.says_parts = says("parts.");
-  config.says_network = says("network.");
+  config.says_spacing = says(kSpacingKey);
+  config.says_network = std::any_of(entries.begin(), entries.end(), [](const auto& entry) {
+    return entry.first.rfind("network.", 0) == 0 && entry.first != kSpacingKey;
+  });
   config.learns_detail = says("detail.");
   if (config.learns_detail) {
     for (const char* other : {"parts.", "network.", "flow.", "start"}) {
@@ -442,6 +446,7 @@ FlowSizes flowSizes(const FlowConfig& config, size_t latent_width) {
 TrainingConfig defaultTrainingConfig() {
   TrainingConfig config;
   config.sizes.leaf_level = 6;
+  config.sizes.follows_spacing = true;
   config.parts = usualParts();
   config.flow.schedule.optimiser.total_steps = 0;
   config.flow.schedule.optimiser.learning_rate = 3e-4;
@@ -462,6 +467,7 @@ TrainingConfig parseTrainingConfig(const std::string& text, const std::string& n
 
 TrainingConfig readSettings(const std::string& settings, const std::string& name) {
   TrainingConfig config = defaultTrainingConfig();
+  config.sizes.follows_spacing = false;  // Files of before it was there say nothing of it.
   setAll(readFlatJson(settings), name, "", config);
   return config;
 }
@@ -477,8 +483,16 @@ void takeStart(const std::string& settings, TrainingConfig& config) {
            "', which the training is to start with, holds a network that adds "
            "detail; weights of an autoencoder are needed");
   }
+  const bool follows_spacing = config.sizes.follows_spacing;
   config.sizes = from.sizes;
+  if (config.says_spacing) config.sizes.follows_spacing = follows_spacing;
   if (config.says_parts) return;
+  if (config.sizes.follows_spacing != from.sizes.follows_spacing) {
+    std::string message = kSpacingKey;
+    message.append(" is not what ").append(config.start);
+    message += " was learned with, and without \"parts\" nothing is learned that could follow";
+    refuse(message);
+  }
   config.parts = from.parts;
   config.objects.points = from.objects.points;
   if (!config.flow.isWanted()) {

@@ -40,8 +40,10 @@ struct TrainingConfig {
   std::string collection;  ///< folder
   std::string out;         ///< folder of all that it writes; made where it is not there
   std::string start;       ///< weights of another training that this one begins with; may be empty
+  std::string latents;     ///< latentsOf() the start where this training keeps its encoder
   bool says_parts = false, says_network = false;  ///< in its text
-  bool learns_detail = false;                     ///< the text has "detail", and neither of them
+  bool says_spacing = false;  ///< whether lengths follow the spacing, which says_network leaves out
+  bool learns_detail = false;  ///< the text has "detail", and neither of them
   /// Of the factors of products in blocks of networks; all else is float32.
   FactorPrecision precision = FactorPrecision::kFloat32;
   uint64_t seed = 1;
@@ -67,7 +69,8 @@ TrainingConfig parseTrainingConfig(const std::string& text, const std::string& n
                                    const std::string& folder);
 
 /// Takes the networks of trained weights, and their parts where the config says none: then these
-/// are done, and the flow alone is learned. In: settings: of the metadata of config.start. Errors:
+/// are done, and the flow alone is learned. Whether lengths follow the spacing may be said anew
+/// where there are parts that learn it. In: settings: of the metadata of config.start. Errors:
 /// kInvalidArgument where the config says other networks, or there is nothing left to learn; those
 /// of readSettings().
 void takeStart(const std::string& settings, TrainingConfig& config);

@@ -42,6 +42,18 @@ std::string inFolder(const std::string& folder, const char* name) {
   return (fs::path(folder) / name).string();
 }
 
+/// Whether the autoencoder is learned, not only the flow.
+bool learnsParts(const TrainingConfig& config) {
+  return config.start.empty() || config.says_parts;
+}
+
+/// Whether latents are those of the training that this one starts with.
+bool keepsEncoder(const TrainingConfig& config) {
+  return !learnsParts(config) ||
+         std::all_of(config.parts.begin(), config.parts.end(),
+                     [](const AutoencoderSchedule& part) { return part.keeps_encoder; });
+}
+
 TrainingConfig readConfig(const std::string& path) {
   const fs::path folder = fs::path(path).parent_path();
   TrainingConfig config =
@@ -53,12 +65,8 @@ TrainingConfig readConfig(const std::string& path) {
     refuse(config.start + ", which the training is to start with, is not of a training of ours");
   }
   takeStart(metadata[kTrainedKey], config);
+  if (keepsEncoder(config)) config.latents = latentsOf(metadata);
   return config;
-}
-
-/// Whether the autoencoder is learned, not only the flow.
-bool learnsParts(const TrainingConfig& config) {
-  return config.start.empty() || config.says_parts;
 }
 
 uint64_t stepCount(const TrainingConfig& config) {
@@ -344,10 +352,10 @@ void TrainingSession::Work::finish() {
     history.by_budget.push_back(made);
   }
   writeTrainedWeights(trainer->networks().tensors(values), settings(),
-                      trainedWeightsPath(config().out));
+                      trainedWeightsPath(config().out), config().latents);
   if (flow) {
     writeTrainedWeights(flow->tensors(flow->meanValues()), settings(),
-                        trainedFlowPath(config().out));
+                        trainedFlowPath(config().out), config().latents);
   }
   writeTrainingReport(settings(), history, trainingReportPath(config().out));
   const std::lock_guard<std::mutex> lock(session.mutex_);

@@ -69,11 +69,20 @@ void requireTrainedWeightsPlace(const std::string& path) {
   });
 }
 
+std::string latentsOf(const std::map<std::string, std::string>& metadata) {
+  for (const char* key : {kLatentsKey, kTrainedKey}) {
+    const auto found = metadata.find(key);
+    if (found != metadata.end()) return found->second;
+  }
+  return {};
+}
+
 void writeTrainedWeights(const TensorTable& tensors, const std::string& settings_json,
-                         const std::string& path) {
+                         const std::string& path, const std::string& latents) {
   requireTrainedWeightsPlace(path);
   SafeTensorsWriter file;
   file.setMetadata(kTrainedKey, settings_json);
+  if (!latents.empty()) file.setMetadata(kLatentsKey, latents);
   for (const auto& [name, tensor] : tensors) file.add(name, tensor);
   file.write(path);
 }
@@ -105,7 +114,10 @@ void writeHalfSizedWeights(const std::string& from, const std::string& to) {
     }
   }
   SafeTensorsWriter file;
-  file.setMetadata(kTrainedKey, settings->second);
+  for (const char* key : {kTrainedKey, kLatentsKey}) {
+    const auto found = metadata.find(key);
+    if (found != metadata.end()) file.setMetadata(key, found->second);
+  }
   for (const auto& [name, half] : halves) file.carry(name, half);
   file.write(to);
 }

@@ -18,10 +18,17 @@ WeightTable openWeightFile(const std::string& path,
 /// What a file of weights that was trained here says in its metadata, by this key.
 constexpr char kTrainedKey[] = "stipple_training";
 
+/// And by this one where it kept the encoder of another training: what that one's file says.
+constexpr char kLatentsKey[] = "stipple_latents";
+/// The training whose encoder the latents are of, which files that fit together have in common;
+/// empty of weights that were not trained here.
+std::string latentsOf(const std::map<std::string, std::string>& metadata);
+
 /// Writes weights that were trained here, with metadata kTrainedKey: the settings of the training,
-/// as JSON. Errors: kIo; kInvalidArgument where the path has a file of another kind.
+/// as JSON, and kLatentsKey where that is given. Errors: kIo; kInvalidArgument where the path has a
+/// file of another kind.
 void writeTrainedWeights(const TensorTable& tensors, const std::string& settings_json,
-                         const std::string& path);
+                         const std::string& path, const std::string& latents = {});
 /// Writes trained weights with 16 bits for each number, each the nearest to what it was: half the
 /// size, read by all that reads the others. In: from: a file of writeTrainedWeights(). Errors:
 /// those of openWeightFile(); kInvalidArgument for weights that were not trained here, a number

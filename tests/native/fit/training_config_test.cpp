@@ -52,6 +52,37 @@ TEST(TrainingConfig, SaysWhichSettingOfACheckpointDiffers) {
             "'parts.0.stage' is structure, the checkpoint has joint");
 }
 
+TEST(TrainingConfig, SplatsFollowTheSpacingButWhereSettingsOfBeforeSayNothing) {
+  const TrainingConfig usual = parsed(R"({"collection": "a", "out": "b"})");
+  EXPECT_TRUE(usual.sizes.follows_spacing);
+  EXPECT_TRUE(readSettings(settingsJson(usual), "ours").sizes.follows_spacing);
+  const TrainingConfig published =
+      parsed(R"({"collection": "a", "out": "b", "network": {"follows_spacing": 0}})");
+  EXPECT_FALSE(published.sizes.follows_spacing);
+  EXPECT_EQ(settingsJson(published).find("follows_spacing"), std::string::npos);
+  EXPECT_FALSE(readSettings(settingsJson(published), "ours").sizes.follows_spacing);
+}
+
+TEST(TrainingConfig, NetworksThatAreLearnedFurtherFollowTheSpacingWhereThatIsSaid) {
+  const std::string of_before = R"({"network.heads": 2})";
+  const auto started = [&](const std::string& more) {
+    TrainingConfig config =
+        parsed((R"({"collection": "a", "out": "b", "start": "c")" + more + "}").c_str());
+    takeStart(of_before, config);
+    return config.sizes;
+  };
+  const std::string parts = R"(, "parts": [{"stage": "joint"}])";
+  EXPECT_FALSE(started(parts).follows_spacing);
+  const AutoencoderSizes sizes = started(parts + R"(, "network": {"follows_spacing": 1})");
+  EXPECT_TRUE(sizes.follows_spacing);
+  EXPECT_EQ(sizes.heads, 2u);
+  EXPECT_THROW(started(parts + R"(, "network": {"heads": 2})"), Error);
+  // The flow alone would leave splats that nothing has made fit.
+  const std::string flow = R"(, "flow": {"steps": 900})";
+  EXPECT_FALSE(started(flow).follows_spacing);
+  EXPECT_THROW(started(flow + R"(, "network": {"follows_spacing": 1})"), Error);
+}
+
 TEST(TrainingConfig, ScalesLossesWhereThatIsSaid) {
   const TrainingConfig usual = parsed(R"({"collection": "a", "out": "b"})");
   EXPECT_EQ(usual.parts[0].optimiser.loss_scaling, LossScaling::kNone);
