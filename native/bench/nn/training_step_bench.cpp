@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
 #include "bench/nn/large_layer.h"
@@ -206,7 +207,9 @@ void takeSteps(benchmark::State& state, FactorPrecision precision) {
   }
   Steps steps(width, precision), wide(width, FactorPrecision::kFloat32);
   LargeLayer layer;
-  std::vector<Reference> references = {{"large_layer", [&] { layer.run(); }}};
+  std::vector<Reference> references = {
+      {"large_layer", [&] { layer.run(); }},
+      {"one_thread", [&] { withThreads(1, [&] { steps.step(); }); }}};
   if (precision != FactorPrecision::kFloat32) {
     references.push_back({"float32", [&] { wide.step(); }});
   }
