@@ -34,7 +34,8 @@ std::vector<float> anchorSpacing(const AnchorSet& anchors) {
   return anchorSpacing(anchors, neighbours);
 }
 
-std::vector<float> spacingUnits(const AnchorSet& anchors, float side) {
+std::vector<float> lengthUnits(const AnchorSet& anchors, float side) {
+  if (side == 0) return std::vector<float>(anchors.size(), 1.0f);
   std::vector<float> units = anchorSpacing(anchors);
   for (float& unit : units) unit /= side;
   return units;

@@ -22,8 +22,8 @@ std::vector<float> anchorSpacing(const AnchorSet& anchors, std::vector<uint32_t>
 /// Bytes that it holds for each anchor: places as double and float, a tree, neighbours.
 constexpr uint64_t kSpacingBytes = 3 * 12 + 64 + 7 * sizeof(uint32_t);
 
-/// The same as units of SplatLayout: splats are then as large as their anchors stand apart.
-/// In: side, > 0, of the lattice that the splats of a unit of 1 fill.
-std::vector<float> spacingUnits(const AnchorSet& anchors, float side);
+/// Units of SplatLayout. In: side of the lattice that the splats of a unit of 1 fill: splats are
+/// then as large as their anchors stand apart; 0: units are 1, whatever the budget is.
+std::vector<float> lengthUnits(const AnchorSet& anchors, float side);
 
 }  // namespace stipple

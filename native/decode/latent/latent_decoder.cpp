@@ -48,9 +48,7 @@ SplatCloud LatentDecoder::decode(const DecodeRequest& request) const {
 SplatCloud LatentDecoder::splatsOf(const AnchorSet& anchors,
                                    std::span<const float> features) const {
   const SplatLayout layout = {network_->gaussians(), 0};
-  const float side = network_->spacingUnit();
-  const std::vector<float> units =
-      side > 0 ? spacingUnits(anchors, side) : std::vector<float>(anchors.size(), 1.0f);
+  const std::vector<float> units = lengthUnits(anchors, network_->spacingUnit());
   const SplatBiases biases = {network_->lattice(), network_->spreadBias()};
   SplatCloud cloud;
   cloud.frame = Frame::kRFU;

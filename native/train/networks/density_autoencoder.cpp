@@ -28,6 +28,11 @@ NetworkShape shapeOf(const AutoencoderSizes& sizes, size_t blocks) {
   return {sizes.heads, sizes.head_width, sizes.latent_width, blocks, sizes.mlp_ratio};
 }
 
+/// What GaussianNetwork calls its spacingUnit().
+float spacingUnitOf(const AutoencoderSizes& sizes) {
+  return sizes.follows_spacing ? static_cast<float>(kLatticeSide) : 0.0f;
+}
+
 /// The density of a latent, for the sampler.
 class SampledDensity final : public DensityModel {
  public:
@@ -124,7 +129,7 @@ TensorTable DensityAutoencoder::tensors(std::span<const float> values) const {
   table["gs.points_offset_perturbation"] = {{sizes_.gaussians, 3}, usualLattice(sizes_.gaussians)};
   table["gs.base_offset_scale"] = {{1}, std::vector<float>{usualSpread()}};
   if (sizes_.follows_spacing) {
-    table["gs.spacing_unit"] = {{1}, std::vector<float>{static_cast<float>(kLatticeSide)}};
+    table["gs.spacing_unit"] = {{1}, std::vector<float>{spacingUnitOf(sizes_)}};
   }
   return table;
 }
@@ -167,8 +172,7 @@ DensityAutoencoder::Splats DensityAutoencoder::splatsOf(std::span<const float> v
   Splats made;
   const SampledDensity density(octree_, values, latent, sizes_.leaf_level);
   made.anchors = sampleAnchors(density, {.count = anchors, .seed = seed});
-  made.units = sizes_.follows_spacing ? spacingUnits(made.anchors, static_cast<float>(kLatticeSide))
-                                      : std::vector<float>(made.anchors.size(), 1.0f);
+  made.units = lengthUnits(made.anchors, spacingUnitOf(sizes_));
   made.raw = splats_.forward(values, latent, made.anchors.size(), made.anchors.positions.data(),
                              made.tape);
   const SplatLayout layout = {sizes_.gaussians, 0};

@@ -294,8 +294,8 @@ TEST(DensityAutoencoder, ItsSplatsAreAsLargeAsTheirAnchorsStandApart) {
   };
   EXPECT_NEAR(meanScale(64), meanScale(512), 1e-6);  // the published unit
   sizes.follows_spacing = true;
-  // The density is that of a volume at first: eight times as many anchors stand half as far apart,
-  // and the cube's sides, where neighbours are missing, are 1.3 spacings of 64 wide.
+  // The density is even at first: eight times as many anchors stand half as far apart, but at the
+  // cube's sides, where neighbours are missing.
   EXPECT_NEAR(meanScale(64) / meanScale(512), 2, 0.15);
 }
 
