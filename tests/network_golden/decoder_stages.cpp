@@ -121,7 +121,8 @@ void decoderStages(const GoldenFile& file, StageReport& report) {
   report.compare("features",
                  networks.gaussians->features(file.run(), keys, points.size() / 3, points.data()),
                  features, kNetworkCall);
-  compareSplats("activated ", file, decoder.splatsOf(points, features), kFormula, report);
+  compareSplats("activated ", file, decoder.splatsOf(recordedAnchors(file), features), kFormula,
+                report);
   DecodeRequest request;
   request.anchors = &anchors;
   request.gaussians_per_anchor = networks.gaussians->gaussians();
