@@ -4,6 +4,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
+#include "base/parallel.h"
 #include "fit/training/encode_object.h"
 #include "fit/training/training_session.h"
 
@@ -29,7 +30,9 @@ StippleStatus stipple_train_start(StippleContext* context, const char* config_pa
     const bool resumes = enumValue<uint32_t>(resume, 1, "resume") == 1;
     auto session =
         std::make_shared<TrainingSession>(context->state->backends, config_path, resumes);
-    context->state->requireMemory(session->memoryBound(), "this training");
+    uint64_t bytes = 0;
+    withThreads(context->state->thread_count, [&] { bytes = session->memoryBound(); });
+    context->state->requireMemory(bytes, "this training");
     *job = startJob(
         context->state,
         [session](Progress& progress) -> JobResult {

@@ -21,6 +21,7 @@
 #include "io/bytes/input_file.h"
 #include "io/reports/training_report.h"
 #include "nn/matrix_backend.h"
+#include "train/networks/example_gradients.h"
 
 namespace stipple {
 
@@ -116,6 +117,13 @@ void requireResults(const std::string& out, bool resumes) {
   requireTrainedWeightsPlace(trainedWeightsPath(out));
   requireTrainedWeightsPlace(trainedFlowPath(out));
   requireTrainingReportPlace(trainingReportPath(out));
+}
+
+/// Bytes of a step. In: numbers of the weights, bytes of an example, examples of a step.
+uint64_t stepBytes(uint64_t weights, uint64_t example, uint64_t batch) {
+  // Weights, derivatives, two moments, the best, a mean in double, and a checkpoint of most.
+  constexpr uint64_t kWeightBytes = 5 * 4 + 8 + 24;
+  return weights * kWeightBytes + examplesAtOnce(batch) * (example + weights * sizeof(float));
 }
 
 }  // namespace
@@ -387,8 +395,6 @@ TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
 }
 
 uint64_t TrainingSession::memoryBound() const {
-  // Weights, derivatives, two moments, the best, a mean in double, and a checkpoint of most.
-  constexpr uint64_t kWeightBytes = 5 * 4 + 8 + 24;
   if (config_.learns_detail) {
     const DetailConfig& detail = config_.detail;
     const DetailModel model(detail.sizes);
@@ -396,20 +402,22 @@ uint64_t TrainingSession::memoryBound() const {
     const uint64_t most = detail.schedule.most_splats;
     const uint64_t rows = model.splatCount(most, most) + most * detail.schedule.views;
     const uint64_t width = detail.sizes.heads * detail.sizes.head_width;
-    return model.layout().size() * kWeightBytes +
-           rows * (8 * width + 512) * (detail.sizes.blocks + 1) * sizeof(float) +
+    const uint64_t example = rows * (8 * width + 512) * (detail.sizes.blocks + 1) * sizeof(float);
+    return stepBytes(model.layout().size(), example, detail.schedule.batch) +
            config_.objects.image_bytes;
   }
   // Rows of the widest tape, about: what all blocks of the three networks keep of a row.
-  uint64_t rows = 0;
+  uint64_t rows = 0, batch = 1;
   for (const AutoencoderSchedule& part : config_.parts) {
+    batch = std::max<uint64_t>(batch, part.batch);
     rows = std::max<uint64_t>(rows, part.most_tokens + part.most_anchors + config_.objects.points);
   }
   const uint64_t width = config_.sizes.heads * config_.sizes.head_width;
   const uint64_t blocks =
       config_.sizes.encoder_blocks + config_.sizes.octree_blocks + config_.sizes.splat_blocks;
-  return DensityAutoencoder(config_.sizes).layout().size() * kWeightBytes +
-         rows * width * (blocks + 4 * config_.sizes.mlp_ratio + 16) * sizeof(float) +
+  const uint64_t example =
+      rows * width * (blocks + 4 * config_.sizes.mlp_ratio + 16) * sizeof(float);
+  return stepBytes(DensityAutoencoder(config_.sizes).layout().size(), example, batch) +
          config_.objects.image_bytes;
 }
 

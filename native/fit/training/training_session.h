@@ -38,7 +38,7 @@ class TrainingSession {
   TrainingSession(std::shared_ptr<const BackendFactory> backends, const std::string& config_path,
                   bool resumes, std::shared_ptr<GradientExchange> exchange = nullptr);
 
-  /// About what run() allocates, bytes.
+  /// About what run() allocates with as many threads as a call from here uses, bytes.
   uint64_t memoryBound() const;
 
   /// The whole work. Where it ends early, also while the result is measured or written, a

@@ -17,14 +17,6 @@ namespace {
 /// Queries of a tile.
 constexpr size_t kTile = 128;
 
-/// to += from, [rows, width] each.
-void addRows(size_t rows, size_t width, const float* from, HeadGradients to, size_t first) {
-  for (size_t row = 0; row < rows; ++row) {
-    float* into = to.values + row * to.row_stride + first;
-    for (size_t i = 0; i < width; ++i) into[i] += from[row * width + i];
-  }
-}
-
 struct HeadWork {
   const AttentionShape& shape;
   HeadRows q, k, v, out, out_gradient;
@@ -49,14 +41,16 @@ void shareOut(size_t count, size_t keys, float scale, float* scores) {
 
 void backwardOfHead(const HeadWork& work, size_t head) {
   const size_t width = work.shape.head_width, keys = work.shape.keys, first = head * width;
-  Scratch room(keys * width + 2 * kTile * keys);
-  float* made = room.data();
-  float* shares = made + keys * width;
+  Scratch room(2 * kTile * keys);
+  float* shares = room.data();
   float* inner = shares + kTile * keys;
   const MatrixView all_keys = {work.k.values + first, work.k.row_stride};
   const PackedMatrix keys_turned(width, keys, {all_keys.values, 1, all_keys.row_stride});
   const PackedMatrix values_turned(width, keys, {work.v.values + first, 1, work.v.row_stride});
   const PackedMatrix packed_keys(keys, width, all_keys);
+  const auto columnsOf = [&](const HeadGradients& of) {
+    return RowMatrix{of.values + first, of.row_stride};
+  };
   for (size_t key = 0; key < keys; ++key) {
     std::fill_n(work.k_gradient.values + key * work.k_gradient.row_stride + first, width, 0.0f);
     std::fill_n(work.v_gradient.values + key * work.v_gradient.row_stride + first, width, 0.0f);
@@ -69,8 +63,7 @@ void backwardOfHead(const HeadWork& work, size_t head) {
     const MatrixView queries = rowsOf(work.q), outer = rowsOf(work.out_gradient);
     keys_turned.multiply(count, queries, {shares, keys});
     shareOut(count, keys, work.scale, shares);
-    PackedMatrix(count, width, outer).multiply(keys, {shares, 1, keys}, {made, width});
-    addRows(keys, width, made, work.v_gradient, first);
+    PackedMatrix(count, width, outer).add(keys, {shares, 1, keys}, columnsOf(work.v_gradient));
     values_turned.multiply(count, outer, {inner, keys});
     const MatrixView results = rowsOf(work.out);
     for (size_t i = 0; i < count; ++i) {
@@ -87,8 +80,7 @@ void backwardOfHead(const HeadWork& work, size_t head) {
     packed_keys.multiply(count, {inner, keys},
                          {work.q_gradient.values + begin * work.q_gradient.row_stride + first,
                           work.q_gradient.row_stride});
-    PackedMatrix(count, width, queries).multiply(keys, {inner, 1, keys}, {made, width});
-    addRows(keys, width, made, work.k_gradient, first);
+    PackedMatrix(count, width, queries).add(keys, {inner, 1, keys}, columnsOf(work.k_gradient));
   }
 }
 

@@ -12,6 +12,13 @@ namespace {
 /// Rows of a task, a multiple of what kernels take at once (12).
 constexpr size_t kTaskRows = 48;
 
+MatrixView rowsFrom(MatrixView a, size_t row) {
+  return {a.values + row * a.row_stride, a.row_stride, a.column_stride};
+}
+RowMatrix rowsFrom(RowMatrix c, size_t row) {
+  return {c.values + row * c.row_stride, c.row_stride};
+}
+
 }  // namespace
 
 PackedMatrix::PackedMatrix(size_t inner, size_t columns, MatrixView b)
@@ -31,12 +38,22 @@ PackedMatrix::PackedMatrix(size_t inner, size_t columns, MatrixView b)
 }
 
 void PackedMatrix::multiply(size_t rows, MatrixView a, RowMatrix c, const float* bias) const {
+  run(rows, a, c, PanelStart::kBias, bias);
+}
+
+void PackedMatrix::add(size_t rows, MatrixView a, RowMatrix c) const {
+  run(rows, a, c, PanelStart::kSums, nullptr);
+}
+
+void PackedMatrix::run(size_t rows, MatrixView a, RowMatrix c, PanelStart start,
+                       const float* bias) const {
   PanelProduct product;
   product.shape = {rows, inner_, columns_};
   product.a = a.values;
   product.is_turned = a.column_stride != 1;
   product.a_stride = product.is_turned ? a.column_stride : a.row_stride;
   product.b = strips_.data();
+  product.start = start;
   product.bias = bias;
   product.c = c.values;
   product.c_stride = c.row_stride;
@@ -47,8 +64,14 @@ void multiplyPacked(const MatmulShape& shape, MatrixView a, MatrixView b, RowMat
                     const float* bias) {
   const PackedMatrix packed(shape.inner, shape.columns, b);
   parallelFor(shape.rows, kTaskRows, [&](size_t begin, size_t end) {
-    packed.multiply(end - begin, {a.values + begin * a.row_stride, a.row_stride, a.column_stride},
-                    {c.values + begin * c.row_stride, c.row_stride}, bias);
+    packed.multiply(end - begin, rowsFrom(a, begin), rowsFrom(c, begin), bias);
+  });
+}
+
+void addPacked(const MatmulShape& shape, MatrixView a, MatrixView b, RowMatrix c) {
+  const PackedMatrix packed(shape.inner, shape.columns, b);
+  parallelFor(shape.rows, kTaskRows, [&](size_t begin, size_t end) {
+    packed.add(end - begin, rowsFrom(a, begin), rowsFrom(c, begin));
   });
 }
 

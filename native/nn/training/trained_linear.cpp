@@ -1,18 +1,10 @@
 #include "nn/training/trained_linear.h"
 
-#include "base/parallel.h"
-#include "nn/scratch.h"
 #include "nn/training/column_sums.h"
 #include "nn/training/narrow_product.h"
 #include "nn/training/packed_product.h"
 
 namespace stipple {
-
-namespace {
-
-constexpr size_t kGrain = 1 << 14;
-
-}  // namespace
 
 TrainedLinear::TrainedLinear(ParameterLayout& layout, const std::string& name, size_t inputs,
                              size_t outputs, LinearBias bias, FactorPrecision precision)
@@ -53,12 +45,8 @@ void TrainedLinear::backward(std::span<const float> values, size_t rows, const f
     return backwardNarrow({rows, inputs_, outputs_}, in, weight, out_gradient, weight_gradient,
                           in_gradient);
   }
-  Scratch made(inputs_ * outputs_);
-  multiplyPacked({outputs_, rows, inputs_}, {out_gradient, 1, outputs_}, {in, inputs_},
-                 {made.data(), inputs_});
-  parallelFor(inputs_ * outputs_, kGrain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) weight_gradient[i] += made.data()[i];
-  });
+  addPacked({outputs_, rows, inputs_}, {out_gradient, 1, outputs_}, {in, inputs_},
+            {weight_gradient, inputs_});
   if (in_gradient == nullptr) return;
   multiplyPacked({rows, outputs_, inputs_}, {out_gradient, outputs_}, {weight, inputs_},
                  {in_gradient, inputs_});

@@ -76,8 +76,9 @@ std::vector<float> DetailTrainer::meanValues() const {
   return {mean.begin(), mean.end()};
 }
 
-void DetailTrainer::addExample(size_t index, uint64_t key, double share, DetailStep& done,
-                               Progress* progress) {
+DetailTrainer::Losses DetailTrainer::addExample(size_t index, uint64_t key, double share,
+                                                std::span<float> gradients,
+                                                Progress* progress) const {
   const double octaves = std::log2(static_cast<double>(schedule_.most_splats) /
                                    static_cast<double>(schedule_.least_splats));
   const double height = unitDouble(keyedBits(key, RandomUse::kAnchorBudget, 0));
@@ -99,29 +100,39 @@ void DetailTrainer::addExample(size_t index, uint64_t key, double share, DetailS
   const std::unique_ptr<ViewPass> pass = backends_->makeViewPass();
   const double view_share = share / static_cast<double>(seen.size());
   const double scaled_share = view_share * optimiser_->lossScale();
+  Losses losses;
   for (const size_t at : seen) {
     if (progress != nullptr) progress->throwIfCancelled();
     const ObjectView view = views.view(at);
     const bool is_white = keyedBits(key, RandomUse::kBackground, at) & 1;
     const ImageLossValue loss = addViewLoss(*pass, view, is_white, fine, {}, schedule_.ssim,
                                             scaled_share, by_view, by_fine, progress);
-    done.l1 += view_share * loss.l1;
-    done.ssim += view_share * loss.ssim;
-    done.loss += view_share * (1 + schedule_.ssim) * loss.loss;
+    losses.l1 += view_share * loss.l1;
+    losses.ssim += view_share * loss.ssim;
+    losses.loss += view_share * (1 + schedule_.ssim) * loss.loss;
   }
-  model_.backward(values_, coarse, evidence, tape, fine, by_fine, gradients_);
+  model_.backward(values_, coarse, evidence, tape, fine, by_fine, gradients);
+  return losses;
 }
 
 DetailStep DetailTrainer::step(Progress* progress) {
   DetailStep done;
   done.step = taken_;
-  std::fill(gradients_.begin(), gradients_.end(), 0.0f);
-  for (size_t b = exchange_->rank(); b < schedule_.batch; b += exchange_->size()) {
+  const size_t count = ownExamples(*exchange_, schedule_.batch);
+  std::vector<Losses> of_examples(count);
+  example_gradients_.sum(count, gradients_, [&](size_t example, std::span<float> gradients) {
+    const size_t b = exchange_->rank() + example * exchange_->size();
     const uint64_t key = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
     const size_t index = objectInRounds(seed_, taken_ * schedule_.batch + b, objects_->count());
-    addExample(index, key, 1 / static_cast<double>(schedule_.batch), done, progress);
+    of_examples[example] =
+        addExample(index, key, 1 / static_cast<double>(schedule_.batch), gradients, progress);
+  });
+  std::vector<double> losses(3);
+  for (const Losses& of : of_examples) {
+    losses[0] += of.loss;
+    losses[1] += of.l1;
+    losses[2] += of.ssim;
   }
-  std::vector<double> losses = {done.loss, done.l1, done.ssim};
   sumStep(*exchange_, values_, gradients_, losses);
   done.loss = losses[0];
   done.l1 = losses[1];

@@ -4,18 +4,20 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/progress.h"
 #include "data/tensor_table.h"
 #include "train/detail/detail_model.h"
 #include "train/networks/density_autoencoder.h"
+#include "train/networks/example_gradients.h"
 #include "train/networks/trainer_run.h"
 #include "train/optimiser/weight_optimiser.h"
 
 namespace stipple {
 
-/// Objects with views, each as coarse splats of any number.
+/// Objects with views, each as coarse splats of any number. Several threads ask at the same time.
 class DetailSource {
  public:
   virtual ~DetailSource() = default;
@@ -75,7 +77,12 @@ class DetailTrainer {
   void resume(const TensorTable& state);
 
  private:
-  void addExample(size_t index, uint64_t key, double share, DetailStep& done, Progress* progress);
+  /// Of an example, times its share of the step.
+  struct Losses {
+    double loss = 0, l1 = 0, ssim = 0;
+  };
+  Losses addExample(size_t index, uint64_t key, double share, std::span<float> gradients,
+                    Progress* progress) const;
 
   DetailModel model_;
   DetailSchedule schedule_;
@@ -84,6 +91,7 @@ class DetailTrainer {
   std::shared_ptr<const BackendFactory> backends_;
   std::shared_ptr<GradientExchange> exchange_;
   std::vector<float> values_, gradients_;
+  ExampleGradients example_gradients_;
   std::optional<WeightOptimiser> optimiser_;
   uint64_t taken_ = 0;
 };

@@ -129,17 +129,22 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
   done.step = taken_;
   done.part = part_;
   done.losses.ssim = 0;
-  std::fill(gradients_.begin(), gradients_.end(), 0.0f);
-  for (size_t b = exchange_->rank(); b < part.batch; b += exchange_->size()) {
-    if (progress != nullptr) progress->throwIfCancelled();
-    const std::shared_ptr<const TrainingObject> object =
-        objects_->object(objectInRounds(seed_, seen_ + b, objects_->count()));
-    example.object = object.get();
-    example.seed = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
-    addLosses(
-        networks_.addExample(values_, example, part.weights, *backends_, gradients_, progress),
-        share, done.losses);
+  const size_t count = ownExamples(*exchange_, part.batch);
+  const auto place = [&](size_t at) { return exchange_->rank() + at * exchange_->size(); };
+  std::vector<std::shared_ptr<const TrainingObject>> objects;
+  for (size_t at = 0; at < count; ++at) {
+    objects.push_back(
+        objects_->object(objectInRounds(seed_, seen_ + place(at), objects_->count())));
   }
+  std::vector<AutoencoderLosses> losses(count);
+  example_gradients_.sum(count, gradients_, [&](size_t at, std::span<float> gradients) {
+    if (progress != nullptr) progress->throwIfCancelled();
+    AutoencoderExample own = example;
+    own.object = objects[at].get();
+    own.seed = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, place(at));
+    losses[at] = networks_.addExample(values_, own, part.weights, *backends_, gradients, progress);
+  });
+  for (const AutoencoderLosses& of : losses) addLosses(of, share, done.losses);
   LossNumbers numbers = numbersOf(done.losses);
   sumStep(*exchange_, values_, gradients_, numbers);
   done.losses = lossesOf(numbers);

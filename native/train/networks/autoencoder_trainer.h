@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/progress.h"
 #include "data/tensor_table.h"
 #include "train/networks/density_autoencoder.h"
+#include "train/networks/example_gradients.h"
 #include "train/networks/trainer_run.h"
 #include "train/optimiser/weight_optimiser.h"
 
@@ -90,6 +92,7 @@ class AutoencoderTrainer {
   std::shared_ptr<const BackendFactory> backends_;
   std::shared_ptr<GradientExchange> exchange_;
   std::vector<float> values_, gradients_;
+  ExampleGradients example_gradients_;
   std::optional<WeightOptimiser> optimiser_;
   size_t part_ = 0;
   uint64_t taken_ = 0;    ///< steps, over all parts, skipped ones among them

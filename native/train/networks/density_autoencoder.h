@@ -43,7 +43,8 @@ struct ObjectView {
   std::vector<float> alpha;  ///< [H,W], of the object
 };
 
-/// Views of an object, read when they are looked at: a step looks at a few of many.
+/// Views of an object, read when they are looked at: a step looks at a few of many. Several threads
+/// ask at the same time.
 class ObjectViews {
  public:
   virtual ~ObjectViews() = default;

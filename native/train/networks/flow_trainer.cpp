@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "base/random.h"
 #include "generate/seeded_noise.h"
 #include "train/networks/start_weights.h"
@@ -155,20 +156,23 @@ FlowTrainer::Drawn FlowTrainer::drawn(FlowObject object, uint64_t key) const {
 FlowStep FlowTrainer::step(Progress* progress) {
   FlowStep done;
   done.step = taken_;
-  std::fill(gradients_.begin(), gradients_.end(), 0.0f);
   const double scale = optimiser_->lossScale();
   const double parts = static_cast<double>(schedule_.batch) / scale;
-  for (size_t b = exchange_->rank(); b < schedule_.batch; b += exchange_->size()) {
+  const size_t count = ownExamples(*exchange_, schedule_.batch);
+  std::vector<double> losses(count);
+  example_gradients_.sum(count, gradients_, [&](size_t example, std::span<float> gradients) {
     if (progress != nullptr) progress->throwIfCancelled();
+    const size_t b = exchange_->rank() + example * exchange_->size();
     const uint64_t key = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
     const size_t index = objectInRounds(seed_, taken_ * schedule_.batch + b, objects_->count());
     const Drawn at = drawn(objects_->object(index, mixBits(key)), key);
     TrainedFlow::Tape tape;
     const Latent seen = flow_.forward(values_, at.example.state, at.time, at.condition, tape);
     Latent by;
-    done.loss += flowLoss(seen, at.example.velocity, at.count * parts, by) / scale;
-    flow_.backward(values_, at.example.state, at.condition, tape, by, gradients_);
-  }
+    losses[example] = flowLoss(seen, at.example.velocity, at.count * parts, by) / scale;
+    flow_.backward(values_, at.example.state, at.condition, tape, by, gradients);
+  });
+  for (const double loss : losses) done.loss += loss;
   sumStep(*exchange_, values_, gradients_, {&done.loss, 1});
   done.weights = optimiser_->step(gradients_, values_);
   ++taken_;
@@ -177,19 +181,20 @@ FlowStep FlowTrainer::step(Progress* progress) {
 
 double FlowTrainer::loss(std::span<const float> values, const FlowSource& objects, size_t draws,
                          uint64_t seed, Progress* progress) const {
+  const size_t all = objects.count() * draws;
+  std::vector<double> losses(all);
+  parallelFor(all, 1, [&](size_t i, size_t) {
+    if (progress != nullptr) progress->throwIfCancelled();
+    const size_t index = i / draws, draw = i % draws;
+    const uint64_t key = keyedBits(seed + index, RandomUse::kAnchorSeed, draw);
+    const Drawn at = drawn(objects.object(index, mixBits(key)), key);
+    TrainedFlow::Tape tape;
+    Latent by;
+    losses[i] = flowLoss(flow_.forward(values, at.example.state, at.time, at.condition, tape),
+                         at.example.velocity, at.count * static_cast<double>(all), by);
+  });
   double sum = 0;
-  const double all = static_cast<double>(objects.count() * draws);
-  for (size_t index = 0; index < objects.count(); ++index) {
-    for (size_t draw = 0; draw < draws; ++draw) {
-      if (progress != nullptr) progress->throwIfCancelled();
-      const uint64_t key = keyedBits(seed + index, RandomUse::kAnchorSeed, draw);
-      const Drawn at = drawn(objects.object(index, mixBits(key)), key);
-      TrainedFlow::Tape tape;
-      Latent by;
-      sum += flowLoss(flow_.forward(values, at.example.state, at.time, at.condition, tape),
-                      at.example.velocity, at.count * all, by);
-    }
-  }
+  for (const double loss : losses) sum += loss;
   return sum;
 }
 

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/progress.h"
 #include "data/tensor_table.h"
+#include "train/networks/example_gradients.h"
 #include "train/networks/trained_flow.h"
 #include "train/networks/trainer_run.h"
 #include "train/optimiser/weight_optimiser.h"
@@ -21,7 +23,7 @@ struct FlowObject {
   ImageCondition condition;
 };
 
-/// Objects, each of which may be seen by several images.
+/// Objects, each of which may be seen by several images. Several threads ask at the same time.
 class FlowSource {
  public:
   virtual ~FlowSource() = default;
@@ -87,6 +89,7 @@ class FlowTrainer {
   std::shared_ptr<GradientExchange> exchange_;
   TrainedFlow flow_;
   std::vector<float> values_, gradients_;
+  ExampleGradients example_gradients_;
   std::optional<WeightOptimiser> optimiser_;
   uint64_t taken_ = 0;
 };

@@ -62,6 +62,10 @@ void requireExamples(const GradientExchange& exchange, size_t batch, const char*
                                         " processes share them; at least one for each is needed");
 }
 
+size_t ownExamples(const GradientExchange& exchange, size_t batch) {
+  return (batch - exchange.rank() + exchange.size() - 1) / exchange.size();
+}
+
 void sumStep(GradientExchange& exchange, std::span<const float> weights, std::span<float> gradients,
              std::span<double> losses) {
   if (exchange.size() == 1) return;

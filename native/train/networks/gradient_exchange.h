@@ -36,6 +36,10 @@ void requireSame(GradientExchange& exchange, uint64_t fingerprint, const char* w
 /// Errors: kInvalidArgument where some rank would have no example in a step. In: part, as "part 2".
 void requireExamples(const GradientExchange& exchange, size_t batch, const char* part);
 
+/// How many of a step's `batch` examples this process has: those from its rank on, in steps of as
+/// many as there are processes.
+size_t ownExamples(const GradientExchange& exchange, size_t batch);
+
 /// What ranks found of their examples becomes that of the step. In: weights that they had. Errors:
 /// requireSame() of the weights, which drift apart where processors round differently.
 void sumStep(GradientExchange& exchange, std::span<const float> weights, std::span<float> gradients,

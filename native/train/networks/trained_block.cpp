@@ -108,8 +108,7 @@ void TrainedTokenBlock::backward(std::span<const float> values, std::span<Latent
 
 void TrainedTokenBlock::backwardOfContexts(std::span<const float> values,
                                            std::span<const ContextRows> contexts,
-                                           std::span<const LatentRows> seen,
-                                           std::span<float> gradients,
+                                           std::span<LatentRows> seen, std::span<float> gradients,
                                            std::span<float* const> by_contexts) const {
   for (size_t i = 0; i < looks_.size(); ++i) {
     looks_[i].attention.backwardOfLatent(values, contexts[i].count, contexts[i].values, seen[i],

@@ -41,7 +41,7 @@ class TrainedTokenBlock {
   /// After backward(). Out: gradients; by_contexts: of each context [count, latent_width], which
   /// this adds to.
   void backwardOfContexts(std::span<const float> values, std::span<const ContextRows> contexts,
-                          std::span<const LatentRows> seen, std::span<float> gradients,
+                          std::span<LatentRows> seen, std::span<float> gradients,
                           std::span<float* const> by_contexts) const;
 
  private:

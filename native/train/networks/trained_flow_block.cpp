@@ -84,11 +84,13 @@ void TrainedRotary::backward(std::span<const float> values, size_t rows, const f
   const size_t inside = rows * sizes_.rotary_width, pairs = sizes_.head_width / 2;
   std::vector<float> by_places(tape.places.size(), 0.0f);
   std::vector<double> by_frequency(pairs, 0.0);
+  std::vector<float> slopes(pairs);
+  for (size_t i = 0; i < pairs; ++i) slopes[i] = std::tanh(values[frequencyAt(i)]);
   for (size_t at = 0; at < rows * sizes_.heads; ++at) {
     for (size_t i = 0; i < pairs; ++i) {
       const float by = kPi * by_angles[at * pairs + i];
       const size_t place = at * kFlowAxes + axisOf(i);
-      by_places[place] += by * std::tanh(values[frequencyAt(i)]);
+      by_places[place] += by * slopes[i];
       by_frequency[i] += static_cast<double>(by) * static_cast<double>(tape.places[place]);
     }
   }

@@ -8,6 +8,7 @@
 #include "nn/activations.h"
 #include "nn/norms.h"
 #include "nn/positions.h"
+#include "nn/scratch.h"
 #include "nn/training/attention_backward.h"
 #include "nn/training/norms_backward.h"
 
@@ -70,7 +71,6 @@ LatentRows TrainedCrossAttention::look(std::span<const float> values, size_t tok
   const size_t width = shape_.width();
   LatentRows rows;
   rows.made.resize(tokens * 2 * width);
-  rows.gradient.assign(rows.made.size(), 0.0f);
   to_latent_.apply(values, tokens, latent, rows.made.data());
   rows.keys.resize(tokens * width);
   for (size_t token = 0; token < tokens; ++token) {
@@ -102,14 +102,18 @@ void TrainedCrossAttention::backward(std::span<const float> values, size_t rows,
                                      float* in_gradient) const {
   const size_t width = shape_.width(), tokens = latent.keys.size() / width;
   std::vector<float> by_attended(rows * width), by_queries(rows * width);
-  std::vector<float> by_latent(latent.gradient.size());
+  // Rows that nobody has looked back at take the derivatives as they are made.
+  const bool is_first = latent.gradient.empty();
+  if (is_first) latent.gradient.resize(latent.made.size());
+  Scratch more(is_first ? 0 : latent.made.size());
+  float* const by_latent = is_first ? latent.gradient.data() : more.data();
   to_out_.backward(values, rows, tape.attended.data(), out_gradient, gradients, by_attended.data());
   attentionBackward({shape_.heads, shape_.head_width, rows, tokens}, {tape.queries.data(), width},
                     {latent.keys.data(), width}, {latent.made.data() + width, 2 * width},
                     {tape.attended.data(), width}, {by_attended.data(), width},
-                    {by_queries.data(), width}, {by_latent.data(), 2 * width},
-                    {by_latent.data() + width, 2 * width});
-  addAll(by_latent, latent.gradient.data());
+                    {by_queries.data(), width}, {by_latent, 2 * width},
+                    {by_latent + width, 2 * width});
+  if (!is_first) addAll({by_latent, latent.made.size()}, latent.gradient.data());
   rmsNormHeadsBackward(rows, shape_.heads, shape_.head_width, gammaOf(values, query_gamma_),
                        tape.made.data(), width, by_queries.data(), width,
                        gradients.data() + query_gamma_);
@@ -117,16 +121,17 @@ void TrainedCrossAttention::backward(std::span<const float> values, size_t rows,
 }
 
 void TrainedCrossAttention::backwardOfLatent(std::span<const float> values, size_t tokens,
-                                             const float* latent, const LatentRows& rows,
+                                             const float* latent, LatentRows& rows,
                                              std::span<float> gradients,
                                              float* latent_gradient) const {
-  const size_t width = shape_.width();
-  std::vector<float> by_made = rows.gradient, by_latent(tokens * shape_.latent_width);
+  if (rows.gradient.empty()) return;
+  const size_t width = shape_.width(), count = tokens * shape_.latent_width;
   rmsNormHeadsBackward(tokens, shape_.heads, shape_.head_width, gammaOf(values, key_gamma_),
-                       rows.made.data(), 2 * width, by_made.data(), 2 * width,
+                       rows.made.data(), 2 * width, rows.gradient.data(), 2 * width,
                        gradients.data() + key_gamma_);
-  to_latent_.backward(values, tokens, latent, by_made.data(), gradients, by_latent.data());
-  addAll(by_latent, latent_gradient);
+  Scratch by_latent(count);
+  to_latent_.backward(values, tokens, latent, rows.gradient.data(), gradients, by_latent.data());
+  addAll({by_latent.data(), count}, latent_gradient);
 }
 
 TrainedSelfAttention::TrainedSelfAttention(ParameterLayout& layout, const std::string& prefix,

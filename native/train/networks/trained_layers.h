@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/default_init_vector.h"
 #include "nn/training/parameter_layout.h"
 #include "nn/training/trained_linear.h"
 #include "nn/training/trained_mlp.h"
@@ -45,9 +46,10 @@ class TrainedPointEmbedding {
 
 /// What a layer of cross-attention sees of a latent, and, on the way back, the derivative by it.
 struct LatentRows {
-  std::vector<float> made;      ///< [tokens, 2 width]: keys before their norm, values
-  std::vector<float> keys;      ///< [tokens, width], normalised
-  std::vector<float> gradient;  ///< [tokens, 2 width]: by normalised keys and values, added up
+  std::vector<float> made;  ///< [tokens, 2 width]: keys before their norm, values
+  std::vector<float> keys;  ///< [tokens, width], normalised
+  /// [tokens, 2 width]: by normalised keys and values, added up; empty until there is some.
+  DefaultInitVector<float> gradient;
 };
 
 /// Tokens look at a latent. Queries and keys are normalised for each head.
@@ -72,10 +74,10 @@ class TrainedCrossAttention {
                 const float* out_gradient, LatentRows& latent, std::span<float> gradients,
                 float* in_gradient) const;
   /// Once all rows have been through backward(). In: latent as look() had it. Out: gradients;
-  /// latent_gradient [tokens, latent_width], which this adds to.
+  /// latent_gradient [tokens, latent_width], which this adds to; rows, whose gradient becomes that
+  /// before the norm.
   void backwardOfLatent(std::span<const float> values, size_t tokens, const float* latent,
-                        const LatentRows& rows, std::span<float> gradients,
-                        float* latent_gradient) const;
+                        LatentRows& rows, std::span<float> gradients, float* latent_gradient) const;
 
  private:
   std::span<const float> gammaOf(std::span<const float> values, size_t first) const {

@@ -62,6 +62,31 @@ TEST(PackedProduct, MultipliesWhateverWayMatricesLie) {
   }
 }
 
+TEST(PackedProduct, AddsToWhatIsThere) {
+  for (const MatmulShape& shape : kShapes) {
+    const Both a(shape.rows, shape.inner, 1), b(shape.inner, shape.columns, 2);
+    const size_t stride = shape.columns + 3;
+    const std::vector<float> before = numbers(shape.rows * stride, 4);
+    std::vector<float> added = before, product(shape.rows * shape.columns);
+    addPacked(shape, a.views[1], b.views[0], {added.data(), stride});
+    multiplyPacked(shape, a.views[1], b.views[0], {product.data(), shape.columns});
+    for (size_t i = 0; i < added.size(); ++i) {
+      const size_t row = i / stride, column = i % stride;
+      if (column >= shape.columns) {
+        ASSERT_EQ(added[i], before[i]) << "what is beside it stays";
+        continue;
+      }
+      const float more = product[row * shape.columns + column];
+      // Twice as many sums as above, those of either order.
+      ASSERT_NEAR(static_cast<double>(added[i]),
+                  static_cast<double>(before[i]) + static_cast<double>(more), 6e-5);
+    }
+    std::vector<float> alone = before;
+    withThreads(1, [&] { addPacked(shape, a.views[0], b.views[1], {alone.data(), stride}); });
+    EXPECT_EQ(alone, added);
+  }
+}
+
 TEST(PackedProduct, EveryKernelReadsTurnedMatrices) {
   const Both a(29, 17, 1);
   const std::vector<float> b = numbers(17 * 40, 2);
