@@ -364,3 +364,37 @@ def test_a_flow_begins_with_networks_that_are_there(given, tmp_path):
         path.write_text(json.dumps({**fields, 'out': 'none', **changes}))
         assert message in error('train', path)
     assert first.exists()
+
+
+def test_a_flow_is_learned_further(given, tmp_path):
+    run('train', given('first.json', out='first', parts=parts(structure=30, attributes=60), flow=FLOW))
+    run('train', given('other.json', out='other', parts=parts(structure=20), flow=dict(FLOW, steps=12)))
+    fields = {key: value for key, value in config(out='second', start='first/weights.safetensors').items()
+              if key not in ('network', 'parts')}
+    further = {'steps': 60, 'batch': 4, 'warm_up': 5, 'learning_rate': 1e-3, 'mean_decay': 0.9,
+               'start': 'first/flow.safetensors'}
+    path = tmp_path / 'second.json'
+    path.write_text(json.dumps({**fields, 'flow': further}))
+    run('train', path)
+    report = {name: json.loads((tmp_path / name / 'report.json').read_text()) for name in ('first', 'second')}
+    loss = {name: [value for value, part in zip(of['by_step']['loss'], of['by_step']['part'])
+                   if of['parts'][part] == 'flow'] for name, of in report.items()}
+    # It goes on where the first one ended, not where that began.
+    assert len(loss['second']) == 60
+    assert sum(loss['second'][:20]) < 0.9 * sum(loss['first'][:20])
+    first, second = (pipeline_weights.read(tmp_path / name / 'flow.safetensors') for name in ('first', 'second'))
+    assert first.keys() == second.keys() and first != second
+    run('generate', tmp_path / 'objects/balls/2/images/0000.png', tmp_path / 'x.ply', '--weights', tmp_path / 'second',
+        '--steps', 4)
+    without = {key: value for key, value in fields.items() if key != 'start'}
+    kept = [dict(part, keeps_encoder=1) for part in parts(attributes=60)]
+    for changes, message in (({'flow': {**further, 'heads': 2}}, '"flow" has sizes and "start"'),
+                             ({'flow': {**further, 'steps': 0}, 'parts': kept}, 'but 0 steps'),
+                             ({'flow': further, 'parts': parts(attributes=60)}, 'which all parts have to keep'),
+                             ({'flow': {**further, 'start': 'other/flow.safetensors'}}, 'not learned of the latents'),
+                             ({'flow': {**further, 'start': 'first/weights.safetensors'}}, 'is not of a flow'),
+                             ({'flow': {**further, 'start': 'nothing.safetensors'}}, 'nothing.safetensors')):
+        path.write_text(json.dumps({**fields, 'out': 'none', **changes}))
+        assert message in error('train', path), message
+    path.write_text(json.dumps({**without, 'out': 'none', 'flow': further}))
+    assert 'which all parts have to keep' in error('train', path)

@@ -149,12 +149,8 @@ void addOptimiser(const std::string& at, const FactorPrecision& precision,
   list.push_back(keptWhere(is_said, number(at + "loss_scale_growth", optimiser.loss_scale_growth)));
 }
 
-void addFlow(const FactorPrecision& precision, FlowConfig& flow, std::vector<Setting>& list) {
-  list.push_back(number("flow.steps", flow.schedule.optimiser.total_steps));
-  list.push_back(number("flow.batch", flow.schedule.batch));
-  list.push_back(number("flow.image_dropout", flow.schedule.image_dropout));
-  list.push_back(number("flow.time_mean", flow.schedule.time_mean));
-  addOptimiser("flow.", precision, flow.schedule.optimiser, list);
+/// Of a flow, all that its weights do not fit without.
+void addFlowSizes(FlowConfig& flow, std::vector<Setting>& list) {
   list.push_back(number("flow.heads", flow.heads));
   list.push_back(number("flow.head_width", flow.head_width));
   list.push_back(number("flow.mlp_ratio", flow.mlp_ratio));
@@ -165,6 +161,17 @@ void addFlow(const FactorPrecision& precision, FlowConfig& flow, std::vector<Set
   list.push_back(number("flow.canvas", flow.patches.canvas));
   list.push_back(number("flow.patch", flow.patches.patch));
   list.push_back(number("flow.in_order", flow.in_order));
+}
+
+void addFlow(const FactorPrecision& precision, const std::string& folder, FlowConfig& flow,
+             std::vector<Setting>& list) {
+  list.push_back(number("flow.steps", flow.schedule.optimiser.total_steps));
+  list.push_back(path("flow.start", flow.start, folder));
+  list.push_back(number("flow.batch", flow.schedule.batch));
+  list.push_back(number("flow.image_dropout", flow.schedule.image_dropout));
+  list.push_back(number("flow.time_mean", flow.schedule.time_mean));
+  addOptimiser("flow.", precision, flow.schedule.optimiser, list);
+  addFlowSizes(flow, list);
 }
 
 void addDetail(const FactorPrecision& precision, DetailConfig& detail, std::vector<Setting>& list) {
@@ -235,7 +242,7 @@ std::vector<Setting> settingsOf(TrainingConfig& config, const std::string& folde
     return list;
   }
   addNetwork(config.sizes, list);
-  addFlow(config.precision, config.flow, list);
+  addFlow(config.precision, folder, config.flow, list);
   for (size_t i = 0; i < config.parts.size(); ++i) {
     addPart("parts." + std::to_string(i) + ".", config.precision, config.parts[i], list);
   }
@@ -351,6 +358,13 @@ void setAll(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
   config.says_network = std::any_of(entries.begin(), entries.end(), [](const auto& entry) {
     return entry.first.rfind("network.", 0) == 0 && entry.first != kSpacingKey;
   });
+  std::vector<Setting> flow_sizes;
+  addFlowSizes(config.flow, flow_sizes);
+  config.flow.says_sizes =
+      std::any_of(flow_sizes.begin(), flow_sizes.end(), [&](const Setting& size) {
+        return std::any_of(entries.begin(), entries.end(),
+                           [&](const auto& entry) { return entry.first == size.name; });
+      });
   config.learns_detail = says("detail.");
   if (config.learns_detail) {
     for (const char* other : {"parts.", "network.", "flow.", "start"}) {
@@ -499,6 +513,21 @@ void takeStart(const std::string& settings, TrainingConfig& config) {
     refuse(
         "with \"start\" and without \"parts\" the flow alone is learned, but \"flow\" has 0 steps");
   }
+}
+
+void takeFlowStart(const std::string& settings, TrainingConfig& config) {
+  FlowConfig& flow = config.flow;
+  if (flow.says_sizes) {
+    refuse("\"flow\" has sizes and \"start\"; the network, and how it sees images, are those of '" +
+           flow.start + "'");
+  }
+  if (!flow.isWanted()) {
+    refuse("\"flow\" has \"start\", but 0 steps; 1 or more are needed to learn it further");
+  }
+  FlowConfig from = readSettings(settings, flow.start).flow;
+  from.start = flow.start;
+  from.schedule = flow.schedule;
+  flow = from;
 }
 
 std::string settingsJson(const TrainingConfig& config) {

@@ -15,6 +15,8 @@ namespace stipple {
 
 /// What a training of the flow network does, once the autoencoder is done.
 struct FlowConfig {
+  std::string start;        ///< a trained flow that this one begins with; may be empty
+  bool says_sizes = false;  ///< in its text: what `start` has a say in
   size_t heads = 4, head_width = 32, mlp_ratio = 4, rotary_width = 16;
   size_t blocks = 4, noise_refiners = 1, context_refiners = 2;
   FlowSchedule schedule;  ///< its total_steps are 0 where no flow is learned
@@ -74,6 +76,12 @@ TrainingConfig parseTrainingConfig(const std::string& text, const std::string& n
 /// kInvalidArgument where the config says other networks, or there is nothing left to learn; those
 /// of readSettings().
 void takeStart(const std::string& settings, TrainingConfig& config);
+
+/// Takes the sizes of a trained flow that this one begins with, and how it sees images and tokens.
+/// In: settings: of the metadata of config.flow.start. Errors: kInvalidArgument where the config
+/// says others, learns no flow, or has another encoder than that of `start`; those of
+/// readSettings().
+void takeFlowStart(const std::string& settings, TrainingConfig& config);
 
 /// All settings that the weights depend on, as a flat JSON object: what a checkpoint must agree in.
 std::string settingsJson(const TrainingConfig& config);

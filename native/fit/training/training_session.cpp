@@ -70,6 +70,30 @@ TrainingConfig readConfig(const std::string& path) {
   return config;
 }
 
+/// The config of a file, with what it begins with.
+TrainingConfig readWholeConfig(const std::string& path) {
+  TrainingConfig config = readConfig(path);
+  const std::string& start = config.flow.start;
+  if (start.empty()) return config;
+  if (config.latents.empty()) {
+    refuse(
+        "\"flow\" has \"start\", and fits the latents that it was learned of: \"start\" beside it "
+        "has "
+        "to name the weights with their encoder, which all parts have to keep");
+  }
+  std::map<std::string, std::string> metadata;
+  // Weights of the autoencoder that was learned before it have the same settings.
+  if (!openWeightFile(start, &metadata).has("shift_table")) {
+    refuse("'" + start + "', which the flow is to start with, is not of a flow");
+  }
+  if (metadata.count(kTrainedKey) == 0 || latentsOf(metadata) != config.latents) {
+    refuse("'" + start + "', which the flow is to start with, was not learned of the latents of '" +
+           config.start + "'");
+  }
+  takeFlowStart(metadata[kTrainedKey], config);
+  return config;
+}
+
 uint64_t stepCount(const TrainingConfig& config) {
   uint64_t steps = 0;
   for (const AutoencoderSchedule& part : config.parts) steps += part.optimiser.total_steps;
@@ -298,6 +322,9 @@ void TrainingSession::Work::learnFlow() {
       std::make_shared<const FlowObjects>(collection, split.learned_from, trainer->networks(),
                                           values, options, &progress),
       TrainerRun{session.exchange_, config().precision});
+  if (!wanted.start.empty()) {
+    flow->start(flow->layout().read(openWeightFile(wanted.start)));
+  }
   if (!flow_state.empty()) flow->resume(flow_state);
   flow_state.clear();
   session.enter("Flow");
@@ -375,7 +402,7 @@ TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
                                  const std::string& config_path, bool resumes,
                                  std::shared_ptr<GradientExchange> exchange)
     : backends_(std::move(backends)),
-      config_(readConfig(config_path)),
+      config_(readWholeConfig(config_path)),
       resumes_(resumes),
       exchange_(exchange ? std::move(exchange) : noExchange()) {
   validate(config_.sizes);

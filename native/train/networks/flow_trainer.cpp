@@ -113,6 +113,12 @@ FlowTrainer::FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, u
   optimiser_.emplace(schedule_.optimiser, values_);
 }
 
+void FlowTrainer::start(std::vector<float> values) {
+  if (values.size() != values_.size()) refuse("weights to begin with are of another flow");
+  values_ = std::move(values);
+  optimiser_.emplace(schedule_.optimiser, values_);
+}
+
 std::vector<float> FlowTrainer::meanValues() const {
   const std::vector<double>& mean = optimiser_->state().mean;
   return {mean.begin(), mean.end()};

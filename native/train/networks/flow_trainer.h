@@ -58,6 +58,10 @@ class FlowTrainer {
   FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, uint64_t seed,
               std::shared_ptr<const FlowSource> objects, TrainerRun run = {});
 
+  /// Begins with other weights, before the first step. In: values, of the layout.
+  void start(std::vector<float> values);
+
+  const ParameterLayout& layout() const { return layout_; }
   const std::vector<float>& values() const { return values_; }
   /// The mean of weights over steps.
   std::vector<float> meanValues() const;
