@@ -78,8 +78,8 @@ TrainingConfig parseTrainingConfig(const std::string& text, const std::string& n
 void takeStart(const std::string& settings, TrainingConfig& config);
 
 /// Takes the sizes of a trained flow that this one begins with, and how it sees images and tokens.
-/// In: settings: of the metadata of config.flow.start. Errors: kInvalidArgument where the config
-/// says others, learns no flow, or has another encoder than that of `start`; those of
+/// In: settings: of the metadata of config.flow.start, whose latents the caller has compared.
+/// Errors: kInvalidArgument where the config says sizes itself, or learns no flow; those of
 /// readSettings().
 void takeFlowStart(const std::string& settings, TrainingConfig& config);
 
