@@ -77,9 +77,8 @@ TrainingConfig readWholeConfig(const std::string& path) {
   if (start.empty()) return config;
   if (config.latents.empty()) {
     refuse(
-        "\"flow\" has \"start\", and fits the latents that it was learned of: \"start\" beside it "
-        "has "
-        "to name the weights with their encoder, which all parts have to keep");
+        "a flow that is learned further fits the latents of its encoder: \"start\" has to name "
+        "weights with that one, which all parts have to keep");
   }
   std::map<std::string, std::string> metadata;
   // Weights of the autoencoder that was learned before it have the same settings.

@@ -118,10 +118,10 @@ DetailTrainer::Losses DetailTrainer::addExample(size_t index, uint64_t key, doub
 DetailStep DetailTrainer::step(Progress* progress) {
   DetailStep done;
   done.step = taken_;
-  const size_t count = ownExamples(*exchange_, schedule_.batch);
-  std::vector<Losses> of_examples(count);
-  example_gradients_.sum(count, gradients_, [&](size_t example, std::span<float> gradients) {
-    const size_t b = exchange_->rank() + example * exchange_->size();
+  const std::vector<size_t> own = ownExamples(*exchange_, schedule_.batch);
+  std::vector<Losses> of_examples(own.size());
+  example_gradients_.sum(own.size(), gradients_, [&](size_t example, std::span<float> gradients) {
+    const size_t b = own[example];
     const uint64_t key = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
     const size_t index = objectInRounds(seed_, taken_ * schedule_.batch + b, objects_->count());
     of_examples[example] =

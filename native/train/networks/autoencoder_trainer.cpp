@@ -129,20 +129,18 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
   done.step = taken_;
   done.part = part_;
   done.losses.ssim = 0;
-  const size_t count = ownExamples(*exchange_, part.batch);
-  const auto place = [&](size_t at) { return exchange_->rank() + at * exchange_->size(); };
+  const std::vector<size_t> own = ownExamples(*exchange_, part.batch);
   std::vector<std::shared_ptr<const TrainingObject>> objects;
-  for (size_t at = 0; at < count; ++at) {
-    objects.push_back(
-        objects_->object(objectInRounds(seed_, seen_ + place(at), objects_->count())));
+  for (const size_t b : own) {
+    objects.push_back(objects_->object(objectInRounds(seed_, seen_ + b, objects_->count())));
   }
-  std::vector<AutoencoderLosses> losses(count);
-  example_gradients_.sum(count, gradients_, [&](size_t at, std::span<float> gradients) {
+  std::vector<AutoencoderLosses> losses(own.size());
+  example_gradients_.sum(own.size(), gradients_, [&](size_t at, std::span<float> gradients) {
     if (progress != nullptr) progress->throwIfCancelled();
-    AutoencoderExample own = example;
-    own.object = objects[at].get();
-    own.seed = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, place(at));
-    losses[at] = networks_.addExample(values_, own, part.weights, *backends_, gradients, progress);
+    AutoencoderExample each = example;
+    each.object = objects[at].get();
+    each.seed = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, own[at]);
+    losses[at] = networks_.addExample(values_, each, part.weights, *backends_, gradients, progress);
   });
   for (const AutoencoderLosses& of : losses) addLosses(of, share, done.losses);
   LossNumbers numbers = numbersOf(done.losses);

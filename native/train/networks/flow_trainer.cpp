@@ -164,11 +164,11 @@ FlowStep FlowTrainer::step(Progress* progress) {
   done.step = taken_;
   const double scale = optimiser_->lossScale();
   const double parts = static_cast<double>(schedule_.batch) / scale;
-  const size_t count = ownExamples(*exchange_, schedule_.batch);
-  std::vector<double> losses(count);
-  example_gradients_.sum(count, gradients_, [&](size_t example, std::span<float> gradients) {
+  const std::vector<size_t> own = ownExamples(*exchange_, schedule_.batch);
+  std::vector<double> losses(own.size());
+  example_gradients_.sum(own.size(), gradients_, [&](size_t example, std::span<float> gradients) {
     if (progress != nullptr) progress->throwIfCancelled();
-    const size_t b = exchange_->rank() + example * exchange_->size();
+    const size_t b = own[example];
     const uint64_t key = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
     const size_t index = objectInRounds(seed_, taken_ * schedule_.batch + b, objects_->count());
     const Drawn at = drawn(objects_->object(index, mixBits(key)), key);

@@ -62,8 +62,10 @@ void requireExamples(const GradientExchange& exchange, size_t batch, const char*
                                         " processes share them; at least one for each is needed");
 }
 
-size_t ownExamples(const GradientExchange& exchange, size_t batch) {
-  return (batch - exchange.rank() + exchange.size() - 1) / exchange.size();
+std::vector<size_t> ownExamples(const GradientExchange& exchange, size_t batch) {
+  std::vector<size_t> own;
+  for (size_t b = exchange.rank(); b < batch; b += exchange.size()) own.push_back(b);
+  return own;
 }
 
 void sumStep(GradientExchange& exchange, std::span<const float> weights, std::span<float> gradients,

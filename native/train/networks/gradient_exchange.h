@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace stipple {
 
@@ -36,9 +37,9 @@ void requireSame(GradientExchange& exchange, uint64_t fingerprint, const char* w
 /// Errors: kInvalidArgument where some rank would have no example in a step. In: part, as "part 2".
 void requireExamples(const GradientExchange& exchange, size_t batch, const char* part);
 
-/// How many of a step's `batch` examples this process has: those from its rank on, in steps of as
-/// many as there are processes.
-size_t ownExamples(const GradientExchange& exchange, size_t batch);
+/// Which of a step's `batch` examples this process has: those from its rank on, in steps of as many
+/// as there are processes.
+std::vector<size_t> ownExamples(const GradientExchange& exchange, size_t batch);
 
 /// What ranks found of their examples becomes that of the step. In: weights that they had. Errors:
 /// requireSame() of the weights, which drift apart where processors round differently.
