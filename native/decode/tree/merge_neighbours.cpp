@@ -15,14 +15,20 @@ namespace stipple {
 
 namespace {
 
-/// The view of the places that nanoflann wants.
+/// The view of the places that nanoflann wants. kWidth: numbers of a place; -1: as many as the list
+/// says.
+template <int kWidth>
 struct PlaceList {
   std::span<const float> places;
-  size_t width;
-  std::span<const uint32_t> rows;  ///< those that are searched
+  size_t list_width;
 
-  const float* place(size_t index) const { return &places[rows[index] * width]; }
-  size_t kdtree_get_point_count() const { return rows.size(); }
+  size_t width() const { return kWidth > 0 ? static_cast<size_t>(kWidth) : list_width; }
+  size_t size() const { return places.size() / width(); }
+  const float* place(size_t index) const { return &places[index * width()]; }
+  PlaceList part(size_t begin, size_t end) const {
+    return {places.subspan(begin * width(), (end - begin) * width()), list_width};
+  }
+  size_t kdtree_get_point_count() const { return size(); }
   float kdtree_get_pt(size_t index, size_t axis) const { return place(index)[axis]; }
   template <typename Box>
   bool kdtree_get_bbox(Box&) const {
@@ -142,17 +148,17 @@ class Nearest {
 template <int kWidth>
 class PlaceTree {
  public:
-  PlaceTree(const PlaceList& all, size_t begin, size_t end)
-      : list_{all.places, all.width, all.rows.subspan(begin, end - begin)},
+  PlaceTree(const PlaceList<kWidth>& all, size_t begin, size_t end)
+      : list_(all.part(begin, end)),
         first_(begin),
-        low_(all.width, std::numeric_limits<float>::max()),
-        high_(all.width, std::numeric_limits<float>::lowest()),
-        tree_(static_cast<int>(all.width), list_,
+        low_(all.width(), std::numeric_limits<float>::max()),
+        high_(all.width(), std::numeric_limits<float>::lowest()),
+        tree_(static_cast<int>(all.width()), list_,
               nanoflann::KDTreeSingleIndexAdaptorParams(kPlacesPerLeaf)) {
     tree_.buildIndex();
-    for (size_t i = 0; i < list_.rows.size(); ++i) {
+    for (size_t i = 0; i < list_.size(); ++i) {
       const float* place = list_.place(i);
-      for (size_t axis = 0; axis < all.width; ++axis) {
+      for (size_t axis = 0; axis < all.width(); ++axis) {
         low_[axis] = std::min(low_[axis], place[axis]);
         high_[axis] = std::max(high_[axis], place[axis]);
       }
@@ -172,19 +178,30 @@ class PlaceTree {
   }
 
  private:
-  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PlaceList>,
-                                                   PlaceList, kWidth, uint32_t>;
-  PlaceList list_;
+  using List = PlaceList<kWidth>;
+  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, List>, List,
+                                                   kWidth, uint32_t>;
+  List list_;
   size_t first_;
   std::vector<float> low_, high_;
   Tree tree_;
 };
 
-/// kWidth: numbers of a place; -1: as many as the list says.
+/// Of those places that are searched; `searched` has their numbers.
 template <int kWidth>
-void search(const PlaceList& list, size_t neighbour_count, std::vector<uint32_t>& rows) {
-  const size_t count = list.rows.size();
+void search(std::span<const float> places, size_t width, std::span<const uint32_t> searched,
+            size_t neighbour_count, std::vector<uint32_t>& rows) {
+  const size_t count = searched.size();
   if (count < 2) return;
+  std::vector<float> side_by_side;
+  if (count * width < places.size()) {
+    resizeFresh(side_by_side, count * width);
+    for (size_t i = 0; i < count; ++i) {
+      std::copy_n(&places[searched[i] * width], width, &side_by_side[i * width]);
+    }
+    places = side_by_side;
+  }
+  const PlaceList<kWidth> list{places, width};
   // The library builds a tree on one thread. Rows follow each other in space, so parts of them
   // hardly overlap.
   const size_t part_size = std::max<size_t>(kLeastPart, (count + kMostParts - 1) / kMostParts);
@@ -203,11 +220,11 @@ void search(const PlaceList& list, size_t neighbour_count, std::vector<uint32_t>
       for (size_t part = 0; part < trees.size(); ++part) {
         if (part != own) trees[part]->search(place, nearest);
       }
-      uint32_t* row = &rows[list.rows[i] * neighbour_count];
+      uint32_t* row = &rows[searched[i] * neighbour_count];
       // What stands in the row already is of the same place.
       size_t kept = static_cast<size_t>(std::find(row, row + neighbour_count, kNoPlace) - row);
       for (size_t k = 0; k < nearest.size() && kept < neighbour_count; ++k) {
-        if (nearest.row(k) != i) row[kept++] = list.rows[nearest.row(k)];
+        if (nearest.row(k) != i) row[kept++] = searched[nearest.row(k)];
       }
     }
   });
@@ -231,11 +248,10 @@ std::vector<uint32_t> nearestNeighbours(std::span<const double> places, size_t n
   });
   const SharedPlaces shared = sharedPlaces(rounded, width, 2 * neighbour_count);
   fillRings(shared, neighbour_count, rows);
-  const PlaceList list{rounded, width, shared.single};
   if (width == 3) {
-    search<3>(list, neighbour_count, rows);
+    search<3>(rounded, width, shared.single, neighbour_count, rows);
   } else {
-    search<-1>(list, neighbour_count, rows);
+    search<-1>(rounded, width, shared.single, neighbour_count, rows);
   }
   return rows;
 }
