@@ -17,6 +17,7 @@
 #include "decode/latent/latent_decoder.h"
 #include "decode/latent/latent_networks.h"
 #include "fit/image_encoders.h"
+#include "fit/image_likeness.h"
 #include "fit/machine_speed.h"
 #include "fit/object_placement.h"
 #include "fit/training/training_config.h"
@@ -239,7 +240,9 @@ struct GenerateSession::Work {
                                             const std::string& settings) const;
   /// The splats of a preview.
   SplatCloud decoded(const SplatModel& model, Progress& progress, double begin, double end) const;
-  void finish(Latent latent, const std::string& settings, Progress& progress);
+  /// In: prepared: empty where there is no image.
+  void finish(Latent latent, const PreparedImage& prepared, const std::string& settings,
+              Progress& progress);
 
   void note(const std::string& name, std::span<const float> numbers, double operations = 0) {
     StageValues values = valuesOf(name, numbers);
@@ -260,7 +263,8 @@ struct GenerateSession::Work {
   std::optional<ByteImage> image;
   std::optional<ByteImage> mask;
   Networks networks;
-  GenerateOptions options;  ///< as the networks take them
+  GenerateOptions options;                             ///< as the networks take them
+  std::shared_ptr<const ImageRendererFactory> images;  ///< null: likeness is not measured
   Stopwatch watch, step_watch;
   std::shared_ptr<const SplatModel> result;
 
@@ -292,6 +296,10 @@ void GenerateSession::takeFeatures(const GenerateSession& other) {
   }
   const std::lock_guard<std::mutex> lock(work_->mutex);
   work_->features = std::move(taken);
+}
+
+void GenerateSession::measureLikeness(std::shared_ptr<const ImageRendererFactory> images) {
+  work_->images = std::move(images);
 }
 
 uint64_t GenerateSession::memoryBound() const {
@@ -364,10 +372,19 @@ void GenerateSession::Work::showPreview(const FlowPreview& preview, Progress& pr
   status.preview_step = preview.step;
 }
 
-void GenerateSession::Work::finish(Latent latent, const std::string& settings, Progress& progress) {
+void GenerateSession::Work::finish(Latent latent, const PreparedImage& prepared,
+                                   const std::string& settings, Progress& progress) {
+  const bool is_judged = images && image;
+  SplatCloud cloud;
+  if (options.size > 0 || is_judged) {
+    cloud = decoded(*modelOf(latent, {}, settings), progress, kSampledShare, kMeasuredShare);
+  }
+  if (is_judged) {
+    const double found = imageLikeness(*images, cloud, prepared, &progress);
+    const std::lock_guard<std::mutex> lock(mutex);
+    status.likeness = found;
+  }
   if (options.size > 0) {
-    const SplatCloud cloud =
-        decoded(*modelOf(latent, {}, settings), progress, kSampledShare, kMeasuredShare);
     note("splats.positions", cloud.positions);
     note("splats.scales", cloud.scales);
     note("splats.opacities", cloud.opacities);
@@ -406,7 +423,7 @@ void GenerateSession::Work::run(Progress& progress) {
   if (!image) {
     sample(run, networks.flow.emptyContext(run, networks.rows(options)), key, state,
            {kPreparationShare, kSampledShare});
-    return finish(std::move(state.latent), key, progress);
+    return finish(std::move(state.latent), prepared, key, progress);
   }
   const std::string features_key = featuresKeyOf(networks, options, prepared);
   if (features && features->key != features_key) features = nullptr;
@@ -418,7 +435,7 @@ void GenerateSession::Work::run(Progress& progress) {
       featuresFor(run, prepared, features_key, middle);
   const FlowContext context = contextOf(run, prepared, found->features, noise.colour, middle);
   sample(run, context, key, state, {middle, kSampledShare});
-  finish(std::move(state.latent), key, progress);
+  finish(std::move(state.latent), prepared, key, progress);
 }
 
 StageListener GenerateSession::Work::layerListener() {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "fit/generate_options.h"
 #include "io/assets/weights_folder.h"
 #include "model/splat_model.h"
+#include "splat/render/image_renderer.h"
 
 namespace stipple {
 
@@ -36,6 +38,9 @@ struct GenerateStatus {
   double seconds = 0;
   double seconds_left = 0;  ///< by the steps that are done; 0: not known yet
   size_t stage_count = 0;
+  double likeness = kNotMeasured;  ///< to the image, dB; NaN: not measured, or not yet
+
+  static constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// What a generation will take, about.
@@ -64,6 +69,9 @@ class GenerateSession {
   /// prepared image and by the same files; else this one asks them itself. Before run(). Sessions
   /// of several seeds then ask once. In: other: its run() may go on or have ended.
   void takeFeatures(const GenerateSession& other);
+  /// run() measures how much the result looks like the image (image_likeness.h), where there is
+  /// one. Before run().
+  void measureLikeness(std::shared_ptr<const ImageRendererFactory> images);
   /// About what run() allocates, bytes.
   uint64_t memoryBound() const;
   /// What a session takes on this machine, whose speed is measured by a short product of matrices,

@@ -98,6 +98,26 @@ def test_seeds_stand_side_by_side_and_differ(stipple, weights, picture):
     assert one.shape == two.shape and np.abs(one - two).max() > 1e-3
 
 
+def test_of_several_seeds_the_best_one_is_kept_where_one_would_stand(stipple, weights, picture, tmp_path):
+    bpy.ops.stipple.splats_from_image(filepath=str(picture), seed=3, seed_count=3, keep_best=True, **SMALL)
+    kept, = bpy.context.selected_objects
+    assert bpy.data.objects[:] == [kept] and tuple(kept.location) == (0, 0, 0)
+    task_module, binding = stipple.scene.generate.image_task, stipple.binding
+    native = stipple.scene.source.sources.context()
+    likeness = {}
+    for seed in range(3, 6):
+        options = binding.generate.generate_options(native.library, task_module.require_weights(), seed=seed, steps=3,
+                                                    token_count=64, canvas_size=512, measures_likeness=1)
+        job = binding.generate.Generation.start(native, binding.image.Image.load(native, picture), None, options)
+        job.wait()
+        likeness[seed] = job.figures().likeness
+    best = max(likeness, key=likeness.get)
+    positions = stipple.scene.source.splat_data.read(kept.data).positions.copy()
+    bpy.ops.stipple.splats_from_image(filepath=str(picture), seed=best, **SMALL)
+    assert (stipple.scene.source.splat_data.read(bpy.context.object.data).positions == positions).all()
+    assert not list((tmp_path / 'cache').glob('generation_*'))
+
+
 def test_an_opaque_image_needs_a_mask(stipple, weights, picture, tmp_path):
     width, height, rgba = pipeline_weights.image()
     pixels = np.frombuffer(rgba, np.uint8).reshape(height, width, 4).copy()

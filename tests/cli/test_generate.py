@@ -116,6 +116,17 @@ def test_several_seeds_are_those_of_single_runs_and_encode_the_image_once(files)
     assert not (files / 'of.ply').exists()
 
 
+def test_of_several_seeds_the_one_that_looks_most_like_the_image_is_kept(files):
+    figures = json.loads(generate(files, 'image.png', 'kept.ply', '--anchors', 40, '--seed', 5, '--seeds', 4,
+                                  '--keep-best', '--checkpoint', files / 'kept.state', '--json').stdout)
+    likeness = {seed: figures[f'seed{seed}.likeness_db'] for seed in range(5, 9)}
+    assert len(set(likeness.values())) == 4 and min(likeness.values()) > 0
+    assert figures['best_seed'] == max(likeness, key=likeness.get)
+    generate(files, 'image.png', 'alone.ply', '--anchors', 40, '--seed', figures['best_seed'])
+    assert (files / 'kept.ply').read_bytes() == (files / 'alone.ply').read_bytes()
+    assert not list(files.glob('kept_*')) and not list(files.glob('*.state'))
+
+
 def test_timings_add_up_to_the_whole(files):
     figures = json.loads(generate(files, 'image.png', 't.ply', '--anchors', 40, '--timings', '--json').stdout)
     steps = [figures[f'step{step}.tokens.operations'] for step in (1, 2, 3)] + [figures['latent.operations']]

@@ -19,11 +19,15 @@ GenerateSession& sessionOf(const StippleJob* job) {
   return keptSession(job, &StippleJob::generation, "makes no splats of an image");
 }
 
-GenerateOptions generateOptionsFrom(const StippleContext& context,
-                                    const StippleGenerateOptions* given) {
+StippleGenerateOptions completedOptions(const StippleGenerateOptions* given) {
   StippleGenerateOptions defaults;
   stipple_generate_options_init(&defaults);
-  const StippleGenerateOptions from = completed(given, defaults, "options");
+  return completed(given, defaults, "options");
+}
+
+GenerateOptions generateOptionsFrom(const StippleContext& context,
+                                    const StippleGenerateOptions* given) {
+  const StippleGenerateOptions from = completedOptions(given);
   GenerateOptions options;
   options.weights_folder =
       weightsFolderOf(context, from.weights_folder_utf8, "options->weights_folder_utf8");
@@ -44,12 +48,6 @@ GenerateOptions generateOptionsFrom(const StippleContext& context,
   options.watches_layers =
       enumValue<uint32_t>(from.watches_layers, 1, "options->watches_layers") == 1;
   return options;
-}
-
-const StippleJob* encodedBy(const StippleGenerateOptions* given) {
-  StippleGenerateOptions defaults;
-  stipple_generate_options_init(&defaults);
-  return completed(given, defaults, "options").encoded_by;
 }
 
 StippleGenerateEstimate estimateTo(const GenerateEstimate& estimate) {
@@ -94,7 +92,11 @@ StippleStatus stipple_generate_start(StippleContext* context, const StippleImage
     if (mask) shown = toMask(toByteImage(*mask->image));
     auto session = std::make_shared<GenerateSession>(std::move(seen), std::move(shown),
                                                      generateOptionsFrom(*context, options));
-    if (const StippleJob* other = encodedBy(options)) session->takeFeatures(sessionOf(other));
+    const StippleGenerateOptions asked = completedOptions(options);
+    if (asked.encoded_by) session->takeFeatures(sessionOf(asked.encoded_by));
+    if (enumValue<uint32_t>(asked.measures_likeness, 1, "options->measures_likeness") == 1) {
+      session->measureLikeness(context->state->backends);
+    }
     context->state->requireMemory(session->memoryBound(), "this generation");
     *job = startJob(
         context->state,
@@ -129,6 +131,7 @@ StippleStatus stipple_generate_figures(const StippleJob* job, StippleGenerateFig
     out.stage_count = static_cast<uint32_t>(status.stage_count);
     out.seconds = status.seconds;
     out.seconds_left = status.seconds_left;
+    out.likeness = status.likeness;
     deliver(figures, out, "figures");
   });
 }

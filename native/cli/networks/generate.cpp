@@ -1,6 +1,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -21,6 +22,7 @@ struct Arguments {
   double guidance = 3.0, shift = 3.0, size = 1.0;
   std::optional<int64_t> anchors;
   bool is_random = false;  ///< no image tells of the object
+  bool keeps_best = false;
   bool mean_colour = false, check = false, timings = false, estimate = false, json = false;
 };
 
@@ -115,32 +117,52 @@ std::string withSeed(const std::string& path, uint64_t seed) {
   return path.substr(0, at) + "_" + std::to_string(seed) + path.substr(at);
 }
 
+/// Where the state of a seed is kept; empty: nowhere.
+std::string checkpointOf(const Arguments& arguments, uint64_t seed) {
+  const std::string& path = arguments.checkpoint;
+  return arguments.seeds == 1 || path.empty() ? path : withSeed(path, seed);
+}
+
 struct Pictures {
   Image image, mask;
 };
 
-/// One seed. In: before: the job of another one, or null. Returns its job.
-Job generated(const Context& context, const Pictures& pictures, const Arguments& arguments,
-              uint64_t seed, const Job& before, Report& report) {
+/// One seed on its way.
+struct Seeded {
+  uint64_t seed = 0;
+  Job job;
+  double likeness = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// In: before: the job of another seed, or null.
+Seeded generated(const Context& context, const Pictures& pictures, const Arguments& arguments,
+                 uint64_t seed, const Job& before, Report& report) {
   const bool is_one = arguments.seeds == 1;
   const std::string prefix = is_one ? "" : "seed" + std::to_string(seed) + ".";
-  const std::string out = is_one ? arguments.out : withSeed(arguments.out, seed);
-  std::string checkpoint = arguments.checkpoint;
-  if (!is_one && !checkpoint.empty()) checkpoint = withSeed(checkpoint, seed);
+  const std::string checkpoint = checkpointOf(arguments, seed);
   StippleGenerateOptions options = optionsOf(arguments);
   options.seed = seed;
   options.encoded_by = before.get();
+  options.measures_likeness = is_one || arguments.is_random ? 0 : 1;
   if (!checkpoint.empty()) options.checkpoint_path_utf8 = checkpoint.c_str();
   auto job = make<Job>(stipple_generate_start, context.get(),
                        const_cast<const StippleImage*>(pictures.image.get()),
                        const_cast<const StippleImage*>(pictures.mask.get()), &options);
   finish(job);
-  const double decode_seconds = saveModelOf(job, out, arguments.anchors, prefix, report);
+  auto figures = sized<StippleGenerateFigures>();
+  check(stipple_generate_figures(job.get(), &figures));
+  if (options.measures_likeness) report.add(prefix + "likeness_db", figures.likeness);
+  double decode_seconds = 0;
+  if (!arguments.keeps_best) {
+    const std::string out = is_one ? arguments.out : withSeed(arguments.out, seed);
+    decode_seconds = saveModelOf(job, out, arguments.anchors, prefix, report);
+  }
   std::error_code ignored;
-  if (!checkpoint.empty()) std::filesystem::remove(checkpoint, ignored);
+  // Of several of which one is kept, those before would begin anew if this one stopped.
+  if (!checkpoint.empty() && !arguments.keeps_best) std::filesystem::remove(checkpoint, ignored);
   if (arguments.check) addStages(job, prefix, arguments.json, report);
   if (arguments.timings) addTimings(job, prefix, decode_seconds, arguments.json, report);
-  return job;
+  return {seed, std::move(job), figures.likeness};
 }
 
 void generate(const Context& context, const Arguments& arguments) {
@@ -170,10 +192,22 @@ void generate(const Context& context, const Arguments& arguments) {
                estimate.image_seconds +
                    static_cast<double>(seeds) * (estimate.seconds - estimate.image_seconds),
                static_cast<double>(estimate.bytes) / (1 << 20));
-  Job job;
+  Seeded best, last;
   for (int64_t i = 0; i < seeds; ++i) {
-    job = generated(context, pictures, arguments, arguments.seed + static_cast<uint64_t>(i), job,
-                    report);
+    Seeded made = generated(context, pictures, arguments, arguments.seed + static_cast<uint64_t>(i),
+                            last.job ? last.job : best.job, report);
+    // The first of those that are alike.
+    const bool is_better = i == 0 || made.likeness > best.likeness;
+    (is_better ? best : last) = std::move(made);
+  }
+  if (arguments.keeps_best) {
+    report.add("best_seed", best.seed);
+    saveModelOf(best.job, arguments.out, arguments.anchors, "", report);
+    for (int64_t i = 0; i < seeds && !arguments.checkpoint.empty(); ++i) {
+      std::error_code ignored;
+      std::filesystem::remove(checkpointOf(arguments, arguments.seed + static_cast<uint64_t>(i)),
+                              ignored);
+    }
   }
   report.add("seconds", secondsSince(start));
   report.print(arguments.json);
@@ -238,6 +272,8 @@ void addGenerate(CLI::App& app, const Context& context) {
       ->capture_default_str();
   command->add_option("--erode", to.erode, "Pixels that the mask shrinks by")
       ->capture_default_str();
+  command->add_flag("--keep-best", to.keeps_best,
+                    "Of the seeds, only the one whose object looks most like the image is written");
   command->add_flag("--mean-colour", to.mean_colour, "No noise on the colours of the image");
   addSettings(command, to);
   addCommand(command, arguments, context);

@@ -2579,7 +2579,7 @@ typedef struct StippleGenerateOptions {
   uint32_t noise_source;     /* StippleNoiseSource, default keyed */
   uint32_t uses_mean_colour; /* 1: no noise on what the colour encoder says; default 0 */
   uint32_t watches_layers;   /* 1: stages have every layer of the encoders too; default 0 */
-  uint32_t reserved;
+  uint32_t measures_likeness; /* 1: figures say how much the object looks like the image; default 0 */
   uint32_t preview_steps;    /* a preview after every so many steps; 0, the default: none */
   uint64_t preview_anchors;  /* of a preview, and of the splats that the size is measured at, default 256 */
   uint64_t seed;             /* of all noise, default 42 */
@@ -2615,6 +2615,8 @@ typedef struct StippleGenerateFigures {
   uint32_t stage_count;  /* of stipple_generate_stage */
   double seconds;
   double seconds_left;   /* by the steps that are done; 0: not known yet */
+  double likeness;       /* dB: how much the object looks like the image, from wherever it looks most like it, both cut
+                            out and over black; for comparing seeds. NaN: not asked for, no image, or not yet */
 } StippleGenerateFigures;
 
 /* What passed by at one place of the networks. */

@@ -22,7 +22,8 @@ CANVASES = (('1024', "1024", "What the networks were trained with last"),
 class GenerateOperator(JobOperator):
     """Mix-in. The operator gives start(context) → ImageTask, and places objects by _matrix(index)."""
 
-    shown_settings = 'steps', 'guidance', 'tokens', 'canvas', 'seed', 'seed_count', 'anchors', 'show_previews'
+    shown_settings = ('steps', 'guidance', 'tokens', 'canvas', 'seed', 'seed_count', 'keep_best', 'anchors',
+                      'show_previews')
     has_image = True
     escape_text = 'Esc stops; the same settings go on from there'
 
@@ -37,6 +38,8 @@ class GenerateOperator(JobOperator):
                       min=0)
     seed_count: IntProperty(name="Seeds", description="How many seeds, from Seed on, are made and put side by side",
                             default=1, min=1, max=64, soft_max=8)
+    keep_best: BoolProperty(name="Keep the Best", description="Of the seeds, keep only the object that looks most like "
+                            "the image", default=False)
     anchors: IntProperty(name="Anchors", description="Budget of the splats at first, in anchors that each become several "
                          "splats; 0 for what the decoder was trained with. It can be changed afterwards", default=0,
                          min=0, soft_max=8192)
@@ -70,7 +73,8 @@ class GenerateOperator(JobOperator):
             context.view_layer.objects.active = obj
         self._names = ()
         count = sum(made.splats.count for made in job.result)
-        self.report({'INFO'}, f"{count:,} splats in {len(job.result)} object{'s' if len(job.result) > 1 else ''}")
+        best = f' (seed {job.result[0].seed}, the best of {self.seed_count})' if self.keep_best else ''
+        self.report({'INFO'}, f"{count:,} splats in {len(job.result)} object{'s' if len(job.result) > 1 else ''}{best}")
 
     def _attach(self, obj, made):
         path = sources.save_model(made.model, source_paths.place_for(obj.name))
@@ -163,4 +167,4 @@ class GenerateAtCursor(GenerateOperator):
         return self.run_in_window(context)
 
     def _matrix(self, index):
-        return placing.beside(self._location, self.size, index, self.seed_count)
+        return placing.beside(self._location, self.size, index, 1 if self.keep_best else self.seed_count)

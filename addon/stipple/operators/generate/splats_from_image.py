@@ -38,7 +38,7 @@ class STIPPLE_OT_splats_from_image(GenerateAtCursor, bpy.types.Operator, ImportH
         mask = binding.image.Image.load(native, mask_path) if mask_path else None
         identity = b''.join(_identity(one) for one in (path, mask_path) if one)
         self._location = tuple(context.scene.cursor.location)
-        return image_task.ImageTask(image, mask, identity, settings, self.seed_count, self.anchors)
+        return image_task.ImageTask(image, mask, identity, settings, self.seed_count, self.anchors, self.keep_best)
 
     def draw(self, context):
         self.layout.use_property_split = True

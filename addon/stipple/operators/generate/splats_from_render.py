@@ -67,7 +67,7 @@ class STIPPLE_OT_splats_from_render(GenerateOperator, bpy.types.Operator):
         image = binding.image.Image.create(sources.context(), seen.linear, structs.Transfer.LINEAR)
         identity = hashlib.sha256(seen.linear.tobytes()).digest()
         settings = self._settings(placing.largest_side(seen.bounds))
-        return image_task.ImageTask(image, None, identity, settings, self.seed_count, self.anchors)
+        return image_task.ImageTask(image, None, identity, settings, self.seed_count, self.anchors, self.keep_best)
 
     def finish(self, context, job):
         super().finish(context, job)

@@ -69,14 +69,14 @@ def estimate_of(settings):
 class ImageTask(Task):
     """Polled like a native job. A seed that was cancelled goes on from its last step when the same is asked again."""
 
-    def __init__(self, image, mask, identity, settings, seed_count, anchors):
+    def __init__(self, image, mask, identity, settings, seed_count, anchors, keeps_best=False):
         """image, mask: binding Images, mask may be None. identity: bytes that tell this image from others. anchors: of
-        the splats that are made at first."""
+        the splats that are made at first. keeps_best: the result is one, that which looks most like the image."""
         self._native, self._folder = sources.context(), require_weights()
         self._image, self._mask = image, mask
         self._settings = [replace(settings, seed=settings.seed + i) for i in range(seed_count)]
         self._checkpoints = [_checkpoint_path(identity, one) for one in self._settings]
-        self._anchors = anchors
+        self._anchors, self._keeps_best = anchors, keeps_best
         self._running = None  # (index, Generation)
         self._encoded = None  # a Generation of this image that has ended: seeds differ in what comes behind encoders
         super().__init__(self._work)
@@ -85,19 +85,30 @@ class ImageTask(Task):
         """(index of the seed, SplatArrays) of the newest preview, each once, or None."""
         running = self._running
         cloud = None if running is None else running[1].preview()
-        return None if cloud is None else (running[0], cloud.columns())
+        return None if cloud is None else (0 if self._keeps_best else running[0], cloud.columns())
 
     def _work(self, task):
-        made, count = [], len(self._settings)
-        for index, settings in enumerate(self._settings):
-            made.append(self._made(task, index, settings, (index / count, (index + 1) / count)))
-        return made
+        count = len(self._settings)
+        parts = [(index / count, (index + 1) / count) for index in range(count)]
+        if not self._keeps_best:
+            return [self._decoded(task, index, self._model(task, index, part)[0], part)
+                    for index, part in enumerate(parts)]
+        best, most = None, None
+        for index, part in enumerate(parts):
+            model, likeness = self._model(task, index, part)
+            if best is None or likeness > most:
+                best, most = (index, model), likeness
+        made = self._decoded(task, *best, parts[-1])
+        for path in self._checkpoints:  # until now, so that a task that was stopped keeps what it has
+            _remove(path)
+        return [made]
 
-    def _made(self, task, index, settings, part):
-        begin, end = part
-        middle = end - _DECODE_SHARE * (end - begin)
+    def _model(self, task, index, part):
+        """The Model of a seed, and its likeness to the image."""
+        begin, middle = part[0], _middle(part)
         path = self._checkpoints[index]
-        options = generate_options(self._native.library, self._folder, path, **settings.fields())
+        options = generate_options(self._native.library, self._folder, path, measures_likeness=int(self._keeps_best),
+                                   **self._settings[index].fields())
         job = Generation.start(self._native, self._image, self._mask, options, self._encoded)
         self._running = index, job
         try:
@@ -105,12 +116,25 @@ class ImageTask(Task):
         finally:
             self._running = None
         self._encoded = job
-        model = Model.of_job(job)
-        if os.path.exists(path):
-            os.remove(path)
+        if not self._keeps_best:
+            _remove(path)
+        return Model.of_job(job), job.figures().likeness
+
+    def _decoded(self, task, index, model, part):
         decoding = DecodeSettings(self._anchors or model.settings().default_budget)
-        decoded = task.run(model.decode_start(decoding), middle, end)
-        return Made(settings.seed, model, Cloud.of_job(decoded).columns(), decoding)
+        decoded = task.run(model.decode_start(decoding), _middle(part), part[1])
+        return Made(self._settings[index].seed, model, Cloud.of_job(decoded).columns(), decoding)
+
+
+def _middle(part):
+    """Where decoding begins in a seed's part of the bar."""
+    begin, end = part
+    return end - _DECODE_SHARE * (end - begin)
+
+
+def _remove(path):
+    if os.path.exists(path):
+        os.remove(path)
 
 
 def _checkpoint_path(identity, settings):
