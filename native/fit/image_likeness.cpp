@@ -17,8 +17,6 @@ namespace stipple {
 namespace {
 
 constexpr uint32_t kSide = 64;  ///< pixels of what is compared
-/// prepareImage() leaves this margin around the box of an object.
-constexpr double kMargin = 1.2;
 constexpr float kShows = 0.5f;  ///< alpha from which on a pixel belongs to the box
 /// Images show objects from about as far: the published views have 40 degrees.
 constexpr double kAngle = 40 * std::numbers::pi / 180;
@@ -49,9 +47,10 @@ struct Direction {
   }
 };
 
-/// Means of squares of a picture. In: rgb [size, size, 3]. Returns: [kSide, kSide, 3] 0..1.
+/// The image with kSide pixels a side, each the mean of what it covers. Returns: [kSide, kSide, 3]
+/// 0..1.
 std::vector<float> reduced(const PreparedImage& image) {
-  std::vector<float> sums(kSide * kSide * 3, 0.0f);
+  std::vector<float> means(kSide * kSide * 3, 0.0f);
   const double step = static_cast<double>(image.size) / kSide;
   for (uint32_t y = 0; y < kSide; ++y) {
     for (uint32_t x = 0; x < kSide; ++x) {
@@ -71,11 +70,11 @@ std::vector<float> reduced(const PreparedImage& image) {
         }
       }
       for (size_t c = 0; c < 3; ++c) {
-        sums[(y * kSide + x) * 3 + c] = static_cast<float>(sum[c] / (255 * weight));
+        means[(y * kSide + x) * 3 + c] = static_cast<float>(sum[c] / (255 * weight));
       }
     }
   }
-  return sums;
+  return means;
 }
 
 /// Compares a cloud with one image from any direction.
@@ -105,7 +104,7 @@ class Likeness {
     }
     if (x0 >= x1) return std::nullopt;
     camera.width = camera.height = kSide;
-    const double zoom = kSide / (kMargin * std::max(x1 - x0, y1 - y0));
+    const double zoom = kSide / (kObjectMargin * std::max(x1 - x0, y1 - y0));
     camera.fx *= zoom;
     camera.fy *= zoom;
     camera.cx = 0.5 * kSide + zoom * (camera.cx - 0.5 * (x0 + x1));
@@ -171,7 +170,7 @@ struct Found {
 };
 
 bool areBeside(const Direction& a, const Direction& b) {
-  return a.outward().dot(b.outward()) > std::cos(1.6 * 12.5 * std::numbers::pi / 180);
+  return a.outward().dot(b.outward()) > std::cos(1.6 * kElevationStep * std::numbers::pi / 180);
 }
 
 /// The best few directions of all, none beside another, from the best one down.
@@ -215,7 +214,7 @@ double aligned(Likeness& likeness, const Found& found) {
   std::optional<Camera> camera = likeness.cutOut(found.direction);
   if (!camera) return 0;
   double best = found.likeness;
-  for (double size : {1.0, 0.5}) {
+  for (const double size : {1.0, 0.5}) {
     const Camera middle = *camera;
     for (int grow = -1; grow <= 1; ++grow) {
       for (int right = -1; right <= 1; ++right) {

@@ -11,8 +11,8 @@ namespace stipple {
 /// are cut out by the box of what shows, with the image's margin, and compared over black.
 /// In: cloud, z up; image, as prepareImage() leaves it. Returns: PSNR in dB over 64 x 64 pixels of
 /// display values, at most 100; 0 for a cloud of which nothing shows. Errors: kCancelled. Same
-/// value for any number of threads. Cost: two small images from each of
-/// about 550 directions, and 270 more.
+/// value for any number of threads. Cost: two small images from each of about 550 directions, and
+/// 270 more.
 double imageLikeness(const ImageRendererFactory& images, const SplatCloud& cloud,
                      const PreparedImage& image, Progress* progress = nullptr);
 

@@ -14,7 +14,6 @@ namespace stipple {
 namespace {
 
 constexpr uint32_t kLongest = 8;  ///< times as long as wide
-constexpr double kMargin = 1.2;   ///< of the square, times the longer side of the box
 constexpr uint32_t kMostErosion = 64;
 
 void validate(const ByteImage& image, const ByteImage* mask, const PreparationOptions& options) {
@@ -130,7 +129,7 @@ void findObject(const ByteImage& alpha, uint32_t erode_radius, PreparedImage& pr
   }
   prepared.box = {x0, y0, x1, y1};
   const double centre_x = (x0 + x1) / 2.0, centre_y = (y0 + y1) / 2.0;
-  const double half = std::max(x1 - x0, y1 - y0) / 2.0 * kMargin;
+  const double half = std::max(x1 - x0, y1 - y0) / 2.0 * kObjectMargin;
   // Toward zero, so that what lies outside on the left is rounded to the right.
   prepared.crop = {static_cast<int32_t>(centre_x - half), static_cast<int32_t>(centre_y - half),
                    static_cast<int32_t>(centre_x + half), static_cast<int32_t>(centre_y + half)};

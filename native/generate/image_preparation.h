@@ -20,6 +20,9 @@ struct PreparationOptions {
 /// Errors: kInvalidArgument for a value outside its range.
 void validate(const PreparationOptions& options);
 
+/// The side of the square around an object, times the longer side of its box.
+constexpr double kObjectMargin = 1.2;
+
 /// An object on black, square, in the middle.
 struct PreparedImage {
   uint32_t size = 0;         ///< side in pixels

@@ -187,7 +187,7 @@ class PlaceTree {
   Tree tree_;
 };
 
-/// Of those places that are searched; `searched` has their numbers.
+/// Finds the neighbours of some places among each other; `searched` has the numbers of those.
 template <int kWidth>
 void search(std::span<const float> places, size_t width, std::span<const uint32_t> searched,
             size_t neighbour_count, std::vector<uint32_t>& rows) {

@@ -73,7 +73,7 @@ class GenerateOperator(JobOperator):
             context.view_layer.objects.active = obj
         self._names = ()
         count = sum(made.splats.count for made in job.result)
-        best = f' (seed {job.result[0].seed}, the best of {self.seed_count})' if self.keep_best else ''
+        best = f' (seed {job.result[0].seed}, the best of {self.seed_count})' if self.keep_best and self.seed_count > 1 else ''
         self.report({'INFO'}, f"{count:,} splats in {len(job.result)} object{'s' if len(job.result) > 1 else ''}{best}")
 
     def _attach(self, obj, made):

@@ -76,13 +76,13 @@ class ImageTask(Task):
         self._image, self._mask = image, mask
         self._settings = [replace(settings, seed=settings.seed + i) for i in range(seed_count)]
         self._checkpoints = [_checkpoint_path(identity, one) for one in self._settings]
-        self._anchors, self._keeps_best = anchors, keeps_best
+        self._anchors, self._keeps_best = anchors, keeps_best and seed_count > 1
         self._running = None  # (index, Generation)
         self._encoded = None  # a Generation of this image that has ended: seeds differ in what comes behind encoders
         super().__init__(self._work)
 
     def preview(self):
-        """(index of the seed, SplatArrays) of the newest preview, each once, or None."""
+        """(index of the object, SplatArrays) of the newest preview, each once, or None."""
         running = self._running
         cloud = None if running is None else running[1].preview()
         return None if cloud is None else (0 if self._keeps_best else running[0], cloud.columns())
@@ -121,6 +121,7 @@ class ImageTask(Task):
         return Model.of_job(job), job.figures().likeness
 
     def _decoded(self, task, index, model, part):
+        """What was made of a seed, with its splats."""
         decoding = DecodeSettings(self._anchors or model.settings().default_budget)
         decoded = task.run(model.decode_start(decoding), _middle(part), part[1])
         return Made(self._settings[index].seed, model, Cloud.of_job(decoded).columns(), decoding)
