@@ -26,11 +26,14 @@ struct GenerateOptions {
   NoiseSeed noise;
   /// The mean of what the colour encoder says instead of a sample.
   bool uses_mean_colour = false;
+  /// The result's colours are led closer to the image (image_matching.h), which networks that were
+  /// trained here can do.
+  bool matches_colours = false;
   /// Notes what passes by in every layer of the encoders too, for comparing with somebody else's
   /// run.
   bool watches_layers = false;
-  /// Metres: the largest side of the object, which stands on the origin with the middle of its base;
-  /// 0: as the networks have it, in a cube of side 1 around the origin.
+  /// Metres: the largest side of the object, which stands on the origin with the middle of its
+  /// base; 0: as the networks have it, in a cube of side 1 around the origin.
   double size = 1.0;
   /// A preview is decoded after every so many steps; 0: never.
   uint32_t preview_steps = 0;

@@ -18,6 +18,7 @@
 #include "decode/latent/latent_networks.h"
 #include "fit/image_encoders.h"
 #include "fit/image_likeness.h"
+#include "fit/image_matching.h"
 #include "fit/machine_speed.h"
 #include "fit/object_placement.h"
 #include "fit/training/training_config.h"
@@ -37,8 +38,10 @@ namespace {
 // What layers pack and threads work in, about (docs/methods/image_encoders.md has measurements).
 constexpr uint64_t kLayerBytes = uint64_t{96} << 20;
 constexpr double kLargestSize = 1e6;  // metres
-// Of the whole work, what comes before the encoders and behind the last step.
+// Of the whole work, what comes before the encoders, behind the last step, and behind what is done
+// with the result. Colours are matched with small networks alone, where that takes longest.
 constexpr double kPreparationShare = 0.01, kSampledShare = 0.96, kMeasuredShare = 0.98;
+constexpr double kSampledBeforeMatching = 0.2, kDecodedShare = 0.25;
 
 FlowSettings flowSettings(const GenerateOptions& options) {
   return {options.steps, options.guidance, options.shift};
@@ -116,6 +119,20 @@ struct Networks {
   }
 };
 
+/// What decodes a latent, as it was trained here: with derivatives. The file itself says how large
+/// it is, since a joint part may have changed what the flow's file says of it.
+DensityAutoencoder differentiableDecoder(const Networks& networks) {
+  const std::string& path = networks.pathOf(WeightsRole::kDecoder);
+  const std::map<std::string, std::string> metadata = metadataOf(path);
+  const auto settings = metadata.find(kTrainedKey);
+  if (settings == metadata.end()) {
+    fail(ErrorCode::kInvalidArgument,
+         "colours are matched with networks that 'stipple train' has learned, and " + path +
+             " holds others; leave this out for them");
+  }
+  return DensityAutoencoder(readSettings(settings->second, path).sizes);
+}
+
 void requireOptions(const GenerateOptions& options) {
   validate(flowSettings(options));
   validate(options.preparation);
@@ -140,8 +157,12 @@ uint64_t workBytes(const Networks& networks, const GenerateOptions& options) {
   const uint64_t condition =
       rows * (encoders.structureWidth() + encoders.colourWidth()) * sizeof(float);
   const uint64_t flow = networks.flow.memoryBound(options.token_count, rows);
+  const uint64_t matching = options.matches_colours ? matchingBytes(differentiableDecoder(networks),
+                                                                    options.preview_anchors,
+                                                                    options.preparation.canvas_size)
+                                                    : 0;
   return condition + kLayerBytes +
-         std::max(encoders.memoryBound(options.preparation.canvas_size), flow);
+         std::max({encoders.memoryBound(options.preparation.canvas_size), flow, matching});
 }
 
 /// What a checkpoint must agree in, as JSON.
@@ -214,6 +235,7 @@ struct GenerateSession::Work {
         mask(std::move(covered)),
         networks(given),
         options(networks.adapted(given)) {
+    if (options.matches_colours) differentiableDecoder(networks);
     // Nothing is followed where there is no image, and one call of the network is enough.
     if (!image) options.guidance = std::min(options.guidance, 1.0);
     status.steps = options.steps;
@@ -240,8 +262,12 @@ struct GenerateSession::Work {
                                             const std::string& settings) const;
   /// The splats of a preview.
   SplatCloud decoded(const SplatModel& model, Progress& progress, double begin, double end) const;
-  /// In: prepared: empty where there is no image.
-  void finish(Latent latent, const PreparedImage& prepared, const std::string& settings,
+  /// Of the whole work, what ends with the last step.
+  double sampledShare() const {
+    return options.matches_colours ? kSampledBeforeMatching : kSampledShare;
+  }
+  /// In: prepared: empty where there is no image; settings, as JSON.
+  void finish(Latent latent, const PreparedImage& prepared, std::string settings,
               Progress& progress);
 
   void note(const std::string& name, std::span<const float> numbers, double operations = 0) {
@@ -263,8 +289,8 @@ struct GenerateSession::Work {
   std::optional<ByteImage> image;
   std::optional<ByteImage> mask;
   Networks networks;
-  GenerateOptions options;                             ///< as the networks take them
-  std::shared_ptr<const ImageRendererFactory> images;  ///< null: likeness is not measured
+  GenerateOptions options;                         ///< as the networks take them
+  std::shared_ptr<const BackendFactory> backends;  ///< null: likeness is not measured
   Stopwatch watch, step_watch;
   std::shared_ptr<const SplatModel> result;
 
@@ -276,14 +302,19 @@ struct GenerateSession::Work {
 };
 
 GenerateSession::GenerateSession(std::optional<ByteImage> image, std::optional<ByteImage> mask,
-                                 const GenerateOptions& options) {
+                                 const GenerateOptions& options,
+                                 std::shared_ptr<const BackendFactory> backends) {
   requireOptions(options);
   if (image) requireByteImage(*image, "The image");
   if (mask && !image) {
     fail(ErrorCode::kInvalidArgument, "there is a mask and no image that it belongs to");
   }
+  if (options.matches_colours && (!image || !backends)) {
+    fail(ErrorCode::kInvalidArgument, "colours are matched to an image, and there is none");
+  }
   if (!options.checkpoint_path.empty()) requireCheckpointPlace(options.checkpoint_path);
   work_ = std::make_unique<Work>(std::move(image), std::move(mask), options);
+  if (work_->image) work_->backends = std::move(backends);
 }
 
 GenerateSession::~GenerateSession() = default;
@@ -296,10 +327,6 @@ void GenerateSession::takeFeatures(const GenerateSession& other) {
   }
   const std::lock_guard<std::mutex> lock(work_->mutex);
   work_->features = std::move(taken);
-}
-
-void GenerateSession::measureLikeness(std::shared_ptr<const ImageRendererFactory> images) {
-  work_->images = std::move(images);
 }
 
 uint64_t GenerateSession::memoryBound() const {
@@ -319,6 +346,12 @@ GenerateEstimate GenerateSession::estimate(const GenerateOptions& given) {
   estimate.seconds = estimate.image_seconds +
                      (sampling.flops - sampling.attention_flops) / speed.products +
                      sampling.attention_flops / speed.attention;
+  if (options.matches_colours) {
+    const double matching =
+        matchingOperations(differentiableDecoder(networks), options.preview_anchors);
+    estimate.operations += matching;
+    estimate.seconds += matching / speed.products;
+  }
   estimate.bytes = workBytes(networks, options);
   for (const WeightsFile& file : networks.folder.files) estimate.weight_bytes += file.bytes;
   return estimate;
@@ -373,16 +406,27 @@ void GenerateSession::Work::showPreview(const FlowPreview& preview, Progress& pr
 }
 
 void GenerateSession::Work::finish(Latent latent, const PreparedImage& prepared,
-                                   const std::string& settings, Progress& progress) {
-  const bool is_judged = images && image;
+                                   std::string settings, Progress& progress) {
   SplatCloud cloud;
-  if (options.size > 0 || is_judged) {
-    cloud = decoded(*modelOf(latent, {}, settings), progress, kSampledShare, kMeasuredShare);
+  if (options.size > 0 || backends) {
+    cloud = decoded(*modelOf(latent, {}, settings), progress, sampledShare(),
+                    options.matches_colours ? kDecodedShare : kMeasuredShare);
   }
-  if (is_judged) {
-    const double found = imageLikeness(*images, cloud, prepared, &progress);
+  if (backends) {
+    ImageLikeness found = imageLikeness(*backends, cloud, prepared, &progress);
+    if (options.matches_colours && found.camera) {
+      const DensityAutoencoder decoder = differentiableDecoder(networks);
+      const std::vector<float> weights =
+          decoder.layout().read(openWeightFile(networks.pathOf(WeightsRole::kDecoder)));
+      matchColours(decoder, weights, options.preview_anchors, *backends, prepared, *found.camera,
+                   latent, &progress, {kDecodedShare, kMeasuredShare});
+      note("latent.matched", latent.tokens, matchingOperations(decoder, options.preview_anchors));
+      settings.insert(settings.size() - 1, ",\"matched_colours\":1");
+      cloud = decoded(*modelOf(latent, {}, settings), progress, kMeasuredShare, kMeasuredShare);
+      found = imageLikeness(*backends, cloud, prepared, &progress);
+    }
     const std::lock_guard<std::mutex> lock(mutex);
-    status.likeness = found;
+    status.likeness = found.psnr;
   }
   if (options.size > 0) {
     note("splats.positions", cloud.positions);
@@ -422,7 +466,7 @@ void GenerateSession::Work::run(Progress& progress) {
 
   if (!image) {
     sample(run, networks.flow.emptyContext(run, networks.rows(options)), key, state,
-           {kPreparationShare, kSampledShare});
+           {kPreparationShare, sampledShare()});
     return finish(std::move(state.latent), prepared, key, progress);
   }
   const std::string features_key = featuresKeyOf(networks, options, prepared);
@@ -430,11 +474,11 @@ void GenerateSession::Work::run(Progress& progress) {
   const double encoding = features ? 0 : networks.encoderWork(size);
   const double sampling = networks.samplingCost(options).flops;
   const double middle =
-      kPreparationShare + (kSampledShare - kPreparationShare) * encoding / (encoding + sampling);
+      kPreparationShare + (sampledShare() - kPreparationShare) * encoding / (encoding + sampling);
   const std::shared_ptr<const KeyedFeatures> found =
       featuresFor(run, prepared, features_key, middle);
   const FlowContext context = contextOf(run, prepared, found->features, noise.colour, middle);
-  sample(run, context, key, state, {middle, kSampledShare});
+  sample(run, context, key, state, {middle, sampledShare()});
   finish(std::move(state.latent), prepared, key, progress);
 }
 

@@ -15,7 +15,7 @@
 #include "fit/generate_options.h"
 #include "io/assets/weights_folder.h"
 #include "model/splat_model.h"
-#include "splat/render/image_renderer.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 
@@ -57,21 +57,22 @@ struct GenerateEstimate {
 class GenerateSession {
  public:
   /// Looks through the weights folder and reads what of the networks is small.
-  /// In: image: null: an object that no image tells of; mask: null, or as prepareImage() takes it.
+  /// In: image: null: an object that no image tells of; mask: null, or as prepareImage() takes it;
+  /// backends: where the result is compared with the image (image_likeness.h), where there is
+  /// one; null: it is not, and colours cannot be matched.
   /// Errors: kInvalidArgument for options out of range; those of findWeights() and
   /// requireWeights(); kFormat for files whose networks do not fit together; those of
-  /// requireCheckpointPlace().
+  /// requireCheckpointPlace(); kInvalidArgument where colours shall be matched without an image, or
+  /// by networks that were not trained here.
   GenerateSession(std::optional<ByteImage> image, std::optional<ByteImage> mask,
-                  const GenerateOptions& options);
+                  const GenerateOptions& options,
+                  std::shared_ptr<const BackendFactory> backends = nullptr);
   ~GenerateSession();
 
   /// What the image encoders said in another session is taken over, where it was of the same
   /// prepared image and by the same files; else this one asks them itself. Before run(). Sessions
   /// of several seeds then ask once. In: other: its run() may go on or have ended.
   void takeFeatures(const GenerateSession& other);
-  /// run() measures how much the result looks like the image (image_likeness.h), where there is
-  /// one. Before run().
-  void measureLikeness(std::shared_ptr<const ImageRendererFactory> images);
   /// About what run() allocates, bytes.
   uint64_t memoryBound() const;
   /// What a session takes on this machine, whose speed is measured by a short product of matrices,

@@ -210,12 +210,11 @@ Found climbed(Likeness& likeness, Found best) {
 }
 
 /// The box of what shows is known to a pixel alone: it is moved and made larger and smaller.
-double aligned(Likeness& likeness, const Found& found) {
-  std::optional<Camera> camera = likeness.cutOut(found.direction);
-  if (!camera) return 0;
-  double best = found.likeness;
+ImageLikeness aligned(Likeness& likeness, const Found& found) {
+  ImageLikeness best = {found.likeness, likeness.cutOut(found.direction)};
+  if (!best.camera) return {};
   for (const double size : {1.0, 0.5}) {
-    const Camera middle = *camera;
+    const Camera middle = *best.camera;
     for (int grow = -1; grow <= 1; ++grow) {
       for (int right = -1; right <= 1; ++right) {
         for (int down = -1; down <= 1; ++down) {
@@ -226,9 +225,7 @@ double aligned(Likeness& likeness, const Found& found) {
           moved.cx = 0.5 * kSide + zoom * (middle.cx - 0.5 * kSide) + size * kShift * kSide * right;
           moved.cy = 0.5 * kSide + zoom * (middle.cy - 0.5 * kSide) + size * kShift * kSide * down;
           const double now = likeness.with(moved);
-          if (now <= best) continue;
-          best = now;
-          camera = moved;
+          if (now > best.psnr) best = {now, moved};
         }
       }
     }
@@ -238,9 +235,9 @@ double aligned(Likeness& likeness, const Found& found) {
 
 }  // namespace
 
-double imageLikeness(const ImageRendererFactory& images, const SplatCloud& cloud,
-                     const PreparedImage& image, Progress* progress) {
-  if (cloud.size() == 0) return 0;
+ImageLikeness imageLikeness(const ImageRendererFactory& images, const SplatCloud& cloud,
+                            const PreparedImage& image, Progress* progress) {
+  if (cloud.size() == 0) return {};
   Likeness likeness(images, cloud, image);
   std::vector<Found> all;
   for (int up = 0; up < kElevations; ++up) {
@@ -250,10 +247,12 @@ double imageLikeness(const ImageRendererFactory& images, const SplatCloud& cloud
       all.push_back({likeness.from(direction), direction});
     }
   }
-  double best = 0;
+  ImageLikeness best;
   for (const Found& start : startsOf(std::move(all))) {
     if (progress) progress->throwIfCancelled();
-    if (start.likeness > 0) best = std::max(best, aligned(likeness, climbed(likeness, start)));
+    if (start.likeness <= 0) continue;
+    const ImageLikeness found = aligned(likeness, climbed(likeness, start));
+    if (found.psnr > best.psnr) best = found;
   }
   return best;
 }

@@ -194,6 +194,7 @@ PreparedImage prepareImage(const ByteImage& image, const ByteImage* mask,
   ByteImage object = cropped(rgba, prepared.crop);
   ByteImage squared = resizeBytes(object, prepared.size, prepared.size);
   prepared.rgb = onBlack(squared);
+  prepared.alpha = alphaOf(squared).pixels;
   if (steps != nullptr) {
     steps->eroded_alpha = std::move(alpha);
     steps->cropped = std::move(object);

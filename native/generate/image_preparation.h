@@ -25,8 +25,9 @@ constexpr double kObjectMargin = 1.2;
 
 /// An object on black, square, in the middle.
 struct PreparedImage {
-  uint32_t size = 0;         ///< side in pixels
-  std::vector<uint8_t> rgb;  ///< [size, size, 3] display sRGB
+  uint32_t size = 0;           ///< side in pixels
+  std::vector<uint8_t> rgb;    ///< [size, size, 3] display sRGB
+  std::vector<uint8_t> alpha;  ///< [size, size], what it was before black
   /// Pixels of the resized image that are not transparent: x0, y0, x1, y1, the last ones included.
   std::array<int32_t, 4> box = {};
   /// What of the resized image fills the square: left, top, right, bottom, the last ones excluded;

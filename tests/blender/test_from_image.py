@@ -118,6 +118,22 @@ def test_of_several_seeds_the_best_one_is_kept_where_one_would_stand(stipple, we
     assert not list((tmp_path / 'cache').glob('generation_*'))
 
 
+def test_colors_are_matched_with_the_networks_that_come_with_the_add_on(stipple, tmp_path):
+    # test_colours_are_led_to_those_of_the_image (tests/cli/test_generate.py) looks at what comes out.
+    side = 128
+    pixels = np.zeros((side, side, 4), np.uint8)
+    y, x = np.mgrid[:side, :side]
+    pixels[((x - 64) / 30) ** 2 + ((y - 64) / 50) ** 2 < 1] = (160, 32, 192, 255)
+    image = str(save_image(tmp_path / 'purple.png', pixels))
+    off = []
+    for matches in (False, True):
+        bpy.ops.stipple.splats_from_image(filepath=image, seed=3, seed_count=2, keep_best=True, match_colours=matches)
+        made, = bpy.context.selected_objects
+        colours = 0.5 + 0.28209479177387814 * stipple.scene.source.splat_data.read(made.data).sh[:, 0]
+        off.append(np.abs(colours - np.array((160, 32, 192)) / 255).mean())
+    assert off[1] < 0.8 * off[0], off
+
+
 def test_an_opaque_image_needs_a_mask(stipple, weights, picture, tmp_path):
     width, height, rgba = pipeline_weights.image()
     pixels = np.frombuffer(rgba, np.uint8).reshape(height, width, 4).copy()

@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import pipeline_weights  # noqa: E402
 
 TOOL = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
+NETWORKS = Path(__file__).resolve().parents[2] / 'addon' / 'stipple' / 'networks'
 SIZES = ('--canvas', pipeline_weights.CANVAS, '--tokens', pipeline_weights.TOKENS)
 SMALL = (*SIZES, '--steps', pipeline_weights.STEPS)
 
@@ -125,6 +126,33 @@ def test_of_several_seeds_the_one_that_looks_most_like_the_image_is_kept(files):
     generate(files, 'image.png', 'alone.ply', '--anchors', 40, '--seed', figures['best_seed'])
     assert (files / 'kept.ply').read_bytes() == (files / 'alone.ply').read_bytes()
     assert not list(files.glob('kept_*')) and not list(files.glob('*.state'))
+
+
+def test_colours_are_led_to_those_of_the_image(tmp_path):
+    side = 128
+    inside = [((x - 64) / 30) ** 2 + ((y - 64) / 50) ** 2 < 1 for y in range(side) for x in range(side)]
+    write_png(tmp_path / 'purple.png', side, side, 4, b''.join(b'\xa0\x20\xc0' + (b'\xff' if shows else b'\0')
+                                                              for shows in inside))
+    common = (tmp_path / 'purple.png', tmp_path / 'made.stipple.safetensors', '--weights', NETWORKS, '--json')
+    figures = json.loads(run(*common, '--seeds', 2, '--keep-best', '--match-colours').stdout)
+    best = figures['best_seed']
+    assert figures['best.likeness_db'] > figures[f'seed{best}.likeness_db'] + 1
+    kept = (tmp_path / 'made.stipple.safetensors').read_bytes()
+    assert b'matched_colours' in kept
+    alone = json.loads(run(*common, '--seed', best, '--match-colours', '--timings').stdout)
+    assert alone['likeness_db'] == figures['best.likeness_db'] and alone['latent.matched.operations'] > 1e9
+    assert (tmp_path / 'made.stipple.safetensors').read_bytes() == kept
+    plain = json.loads(run(*common, '--seed', best, '--estimate').stdout)
+    matched = json.loads(run(*common, '--seed', best, '--match-colours', '--estimate').stdout)
+    assert matched['operations'] > 2 * plain['operations'] and matched['estimated_bytes'] > plain['estimated_bytes']
+
+
+def test_published_networks_match_no_colours(files):
+    for more in ((), ('--estimate',)):
+        message = error(files / 'image.png', files / 'm.ply', '--weights', files / 'weights', *SMALL, '--match-colours',
+                        *more)
+        assert 'stipple train' in message and 'colours' in message, message
+    assert not (files / 'm.ply').exists()
 
 
 def test_timings_add_up_to_the_whole(files):

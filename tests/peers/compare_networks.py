@@ -3,7 +3,7 @@
 """What networks that 'stipple train' has learned make of objects that they have never seen.
 
     compare_networks.py LIBRARY NETWORKS COLLECTION [--held-out 12] [--anchors 256] [--steps 20] [--guidance 3]
-        [--image 12] [--tries 1] [--objects 1000] [--picture FILE]
+        [--image 12] [--tries 1] [--match-colours] [--objects 1000] [--picture FILE]
 
 NETWORKS holds weights.safetensors and flow.safetensors, COLLECTION is the folder that they were learned from, of which
 every --held-out-th object by name was kept from them. For each of those, over all its images but one:
@@ -80,13 +80,17 @@ class Judge:
     def generated(self, image):
         jobs = []
         for seed in range(1, self._given.tries + 1):
-            options = generate_options(self._context.library, self._given.networks, seed=seed, steps=self._given.steps,
-                                       guidance=self._given.guidance, size=0, measures_likeness=self._given.tries > 1)
-            jobs.append(Generation.start(self._context, Image.create(self._context, image), None, options,
-                                         jobs[-1] if jobs else None))
-            jobs[-1].wait()
-        best = max(jobs, key=lambda job: job.figures().likeness) if len(jobs) > 1 else jobs[0]
-        return self._decoded(Model.of_job(best), 1)
+            jobs.append(self._job(image, jobs[-1] if jobs else None, seed, measures_likeness=self._given.tries > 1))
+        best = max(range(len(jobs)), key=lambda i: jobs[i].figures().likeness) if len(jobs) > 1 else 0
+        job = self._job(image, jobs[best], best + 1, matches_colours=1) if self._given.match_colours else jobs[best]
+        return self._decoded(Model.of_job(job), 1)
+
+    def _job(self, image, before, seed, **options):
+        options = generate_options(self._context.library, self._given.networks, seed=seed, steps=self._given.steps,
+                                   guidance=self._given.guidance, size=0, **options)
+        job = Generation.start(self._context, Image.create(self._context, image), None, options, before)
+        job.wait()
+        return job
 
     def _decoded(self, model, seed):
         return model.decode(DecodeSettings(self._given.anchors, model.settings().default_gaussians_per_anchor,
@@ -118,6 +122,7 @@ def main():
     parser.add_argument('--guidance', type=float, default=3)
     parser.add_argument('--image', type=int, default=12, help='the one that is told')
     parser.add_argument('--tries', type=int, default=1, help='seeds that are tried for each image')
+    parser.add_argument('--match-colours', action='store_true', help="lead the object's colours closer to the image")
     parser.add_argument('--objects', type=int, default=1000)
     parser.add_argument('--picture', type=Path, help='a PNG of some objects: truth, encoded, generated, nearest')
     given = parser.parse_args()

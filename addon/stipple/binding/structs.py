@@ -553,10 +553,10 @@ class StippleWeightsInfo(_Sized):
 class StippleGenerateOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('steps', c_uint32), ('token_count', c_uint32), ('canvas_size', c_uint32),
                 ('erode_radius', c_uint32), ('noise_source', c_uint32), ('uses_mean_colour', c_uint32),
-                ('watches_layers', c_uint32), ('measures_likeness', c_uint32), ('preview_steps', c_uint32),
-                ('preview_anchors', c_uint64), ('seed', c_uint64), ('guidance', c_double), ('shift', c_double),
-                ('size', c_double), ('weights_folder_utf8', c_char_p), ('checkpoint_path_utf8', c_char_p),
-                ('encoded_by', c_void_p)]
+                ('watches_layers', c_uint32), ('measures_likeness', c_uint32), ('matches_colours', c_uint32),
+                ('reserved', c_uint32), ('preview_steps', c_uint32), ('preview_anchors', c_uint64), ('seed', c_uint64),
+                ('guidance', c_double), ('shift', c_double), ('size', c_double), ('weights_folder_utf8', c_char_p),
+                ('checkpoint_path_utf8', c_char_p), ('encoded_by', c_void_p)]
 
 
 class StippleGenerateEstimate(_Sized):

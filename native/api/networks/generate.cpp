@@ -43,6 +43,8 @@ GenerateOptions generateOptionsFrom(const StippleContext& context,
                    from.seed};
   options.uses_mean_colour =
       enumValue<uint32_t>(from.uses_mean_colour, 1, "options->uses_mean_colour") == 1;
+  options.matches_colours =
+      enumValue<uint32_t>(from.matches_colours, 1, "options->matches_colours") == 1;
   options.preview_steps = from.preview_steps;
   options.preview_anchors = from.preview_anchors;
   options.watches_layers =
@@ -90,13 +92,14 @@ StippleStatus stipple_generate_start(StippleContext* context, const StippleImage
     std::optional<ByteImage> seen, shown;
     if (image) seen = toByteImage(*image->image);
     if (mask) shown = toMask(toByteImage(*mask->image));
-    auto session = std::make_shared<GenerateSession>(std::move(seen), std::move(shown),
-                                                     generateOptionsFrom(*context, options));
+    const GenerateOptions settings = generateOptionsFrom(*context, options);
     const StippleGenerateOptions asked = completedOptions(options);
+    const bool looks =
+        settings.matches_colours ||
+        enumValue<uint32_t>(asked.measures_likeness, 1, "options->measures_likeness") == 1;
+    auto session = std::make_shared<GenerateSession>(std::move(seen), std::move(shown), settings,
+                                                     looks ? context->state->backends : nullptr);
     if (asked.encoded_by) session->takeFeatures(sessionOf(asked.encoded_by));
-    if (enumValue<uint32_t>(asked.measures_likeness, 1, "options->measures_likeness") == 1) {
-      session->measureLikeness(context->state->backends);
-    }
     context->state->requireMemory(session->memoryBound(), "this generation");
     *job = startJob(
         context->state,

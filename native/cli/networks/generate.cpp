@@ -22,7 +22,7 @@ struct Arguments {
   double guidance = 3.0, shift = 3.0, size = 1.0;
   std::optional<int64_t> anchors;
   bool is_random = false;  ///< no image tells of the object
-  bool keeps_best = false;
+  bool keeps_best = false, matches_colours = false;
   bool mean_colour = false, check = false, timings = false, estimate = false, json = false;
 };
 
@@ -38,6 +38,7 @@ StippleGenerateOptions optionsOf(const Arguments& arguments) {
   options.noise_source =
       arguments.seed_mode == "torch-cpu" ? STIPPLE_NOISE_TORCH_CPU : STIPPLE_NOISE_KEYED;
   options.uses_mean_colour = arguments.mean_colour ? 1 : 0;
+  options.matches_colours = arguments.matches_colours ? 1 : 0;
   options.watches_layers = arguments.check ? 1 : 0;
   options.seed = arguments.seed;
   options.guidance = arguments.guidance;
@@ -134,16 +135,19 @@ struct Seeded {
   double likeness = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// In: before: the job of another seed, or null.
+/// In: before: the job of another seed, or null; is_last: of the seeds one was chosen, and this is
+/// made of it.
 Seeded generated(const Context& context, const Pictures& pictures, const Arguments& arguments,
-                 uint64_t seed, const Job& before, Report& report) {
+                 uint64_t seed, const Job& before, bool is_last, Report& report) {
   const bool is_one = arguments.seeds == 1;
-  const std::string prefix = is_one ? "" : "seed" + std::to_string(seed) + ".";
+  const std::string prefix = is_last ? "best." : is_one ? "" : "seed" + std::to_string(seed) + ".";
   const std::string checkpoint = checkpointOf(arguments, seed);
   StippleGenerateOptions options = optionsOf(arguments);
   options.seed = seed;
   options.encoded_by = before.get();
   options.measures_likeness = is_one || arguments.is_random ? 0 : 1;
+  // Seeds are compared as they are: by matched ones a wrong shape is told less well.
+  if (arguments.keeps_best && !is_one && !is_last) options.matches_colours = 0;
   if (!checkpoint.empty()) options.checkpoint_path_utf8 = checkpoint.c_str();
   auto job = make<Job>(stipple_generate_start, context.get(),
                        const_cast<const StippleImage*>(pictures.image.get()),
@@ -151,7 +155,8 @@ Seeded generated(const Context& context, const Pictures& pictures, const Argumen
   finish(job);
   auto figures = sized<StippleGenerateFigures>();
   check(stipple_generate_figures(job.get(), &figures));
-  if (options.measures_likeness) report.add(prefix + "likeness_db", figures.likeness);
+  if (options.measures_likeness || options.matches_colours)
+    report.add(prefix + "likeness_db", figures.likeness);
   double decode_seconds = 0;
   if (!arguments.keeps_best) {
     const std::string out = is_one ? arguments.out : withSeed(arguments.out, seed);
@@ -195,13 +200,16 @@ void generate(const Context& context, const Arguments& arguments) {
   Seeded best, last;
   for (int64_t i = 0; i < seeds; ++i) {
     Seeded made = generated(context, pictures, arguments, arguments.seed + static_cast<uint64_t>(i),
-                            last.job ? last.job : best.job, report);
+                            last.job ? last.job : best.job, false, report);
     // The first of those that are alike.
     const bool is_better = i == 0 || made.likeness > best.likeness;
     (is_better ? best : last) = std::move(made);
   }
   if (arguments.keeps_best) {
     report.add("best_seed", best.seed);
+    if (arguments.matches_colours && seeds > 1) {
+      best = generated(context, pictures, arguments, best.seed, best.job, true, report);
+    }
     saveModelOf(best.job, arguments.out, arguments.anchors, "", report);
     for (int64_t i = 0; i < seeds && !arguments.checkpoint.empty(); ++i) {
       std::error_code ignored;
@@ -274,6 +282,8 @@ void addGenerate(CLI::App& app, const Context& context) {
       ->capture_default_str();
   command->add_flag("--keep-best", to.keeps_best,
                     "Of the seeds, only the one whose object looks most like the image is written");
+  command->add_flag("--match-colours", to.matches_colours,
+                    "Lead the colours closer to the image; with networks of 'stipple train' alone");
   command->add_flag("--mean-colour", to.mean_colour, "No noise on the colours of the image");
   addSettings(command, to);
   addCommand(command, arguments, context);

@@ -2580,6 +2580,9 @@ typedef struct StippleGenerateOptions {
   uint32_t uses_mean_colour; /* 1: no noise on what the colour encoder says; default 0 */
   uint32_t watches_layers;   /* 1: stages have every layer of the encoders too; default 0 */
   uint32_t measures_likeness; /* 1: figures say how much the object looks like the image; default 0 */
+  uint32_t matches_colours;  /* 1: the object's colours are led closer to the image, and its likeness is measured;
+                                default 0. Networks of stipple_train_start alone: others are refused */
+  uint32_t reserved;
   uint32_t preview_steps;    /* a preview after every so many steps; 0, the default: none */
   uint64_t preview_anchors;  /* of a preview, and of the splats that the size is measured at, default 256 */
   uint64_t seed;             /* of all noise, default 42 */

@@ -195,6 +195,17 @@ void DensityAutoencoder::addDensity(std::span<const float> values, const Context
                    by_latent);
 }
 
+void DensityAutoencoder::backwardOfSplats(std::span<const float> values, const ContextRows& latent,
+                                          Splats& splats, const SplatCloud& by_cloud,
+                                          std::span<float> gradients, float* by_latent) const {
+  const SplatLayout layout = {sizes_.gaussians, 0};
+  std::vector<float> by_raw(splats.raw.size());
+  activateSplatsBackward(layout, splats.layoutAnchors(), splats.raw.data(), layout.outputs(),
+                         splats.unit_cloud, by_cloud, by_raw.data());
+  splats_.backward(values, latent, splats.anchors.size(), splats.anchors.positions.data(),
+                   splats.tape, by_raw, gradients, by_latent);
+}
+
 void DensityAutoencoder::addImages(std::span<const float> values, const AutoencoderExample& example,
                                    const AutoencoderLossWeights& weights,
                                    const BackendFactory& backends, const ContextRows& latent,
@@ -233,12 +244,7 @@ void DensityAutoencoder::addImages(std::span<const float> values, const Autoenco
   }
   losses.splats = addSplatLosses(weights.splats, example.share, splats.anchors.positions,
                                  sizes_.gaussians, splats.unit_cloud, by_cloud);
-  const SplatLayout layout = {sizes_.gaussians, 0};
-  std::vector<float> by_raw(splats.raw.size());
-  activateSplatsBackward(layout, splats.layoutAnchors(), splats.raw.data(), layout.outputs(),
-                         splats.unit_cloud, by_cloud, by_raw.data());
-  splats_.backward(values, latent, splats.anchors.size(), splats.anchors.positions.data(),
-                   splats.tape, by_raw, gradients, by_latent);
+  backwardOfSplats(values, latent, splats, by_cloud, gradients, by_latent);
   losses.total += losses.l1 + weights.ssim * (1 - losses.ssim) +
                   weights.splats.volume * losses.splats.volume +
                   weights.splats.opacity * losses.splats.opacity +
@@ -300,6 +306,25 @@ AutoencoderLosses DensityAutoencoder::addExample(std::span<const float> values,
   const std::vector<float*> nobody(points.size(), nullptr);
   encoder_.backward(values, points, tape, by, gradients, nobody);
   return losses;
+}
+
+ImageLossValue DensityAutoencoder::addColours(std::span<const float> values,
+                                              std::span<const float> latent, const ObjectView& view,
+                                              const AnchorDraw& draw, double ssim,
+                                              const BackendFactory& backends,
+                                              std::span<float> by_latent) const {
+  const ContextRows rows = {latent.size() / sizes_.latent_width, latent.data()};
+  Splats splats = splatsOf(values, rows, draw.anchors, draw.seed);
+  const SplatCloud cloud = splats.aroundOrigin();
+  SplatCloud by_all = zerosLike(cloud), by_view, by_colours = zerosLike(cloud);
+  const bool is_white = keyedBits(draw.seed, RandomUse::kBackground, 0) & 1;
+  const std::unique_ptr<ViewPass> pass = backends.makeViewPass();
+  const ImageLossValue loss =
+      addViewLoss(*pass, view, is_white, cloud, {}, ssim, 1, by_view, by_all, nullptr);
+  by_colours.sh = std::move(by_all.sh);
+  std::vector<float> of_weights(layout_.size(), 0.0f);  // Nobody asks for them.
+  backwardOfSplats(values, rows, splats, by_colours, of_weights, by_latent.data());
+  return loss;
 }
 
 std::vector<float> DensityAutoencoder::encode(std::span<const float> values,

@@ -109,6 +109,12 @@ struct AutoencoderLosses {
   SplatLosses splats;
 };
 
+/// Which splats of a latent are drawn.
+struct AnchorDraw {
+  uint64_t anchors = 256;
+  uint64_t seed = 0;
+};
+
 /// The density autoencoder as it is trained: encoder, density and splats.
 class DensityAutoencoder {
  public:
@@ -135,6 +141,13 @@ class DensityAutoencoder {
                                const BackendFactory& backends, std::span<float> gradients,
                                Progress* progress = nullptr) const;
 
+  /// What a latent's splats lose in one view, L1 and `ssim` times 1 - SSIM before white or black,
+  /// with derivatives by their colours alone: all else of them is taken as it is. Out: by_latent
+  /// [tokens, latent_width], which this adds to. Errors and determinism: as addExample().
+  ImageLossValue addColours(std::span<const float> values, std::span<const float> latent,
+                            const ObjectView& view, const AnchorDraw& draw, double ssim,
+                            const BackendFactory& backends, std::span<float> by_latent) const;
+
   /// The latent of an object, the mean of what is drawn. Out: [tokens, latent_width].
   std::vector<float> encode(std::span<const float> values, const TrainingObject& object,
                             size_t tokens) const;
@@ -148,6 +161,10 @@ class DensityAutoencoder {
   std::vector<FeaturePoints> pointsOf(const TrainingObject& object) const;
   Splats splatsOf(std::span<const float> values, const ContextRows& latent, uint64_t anchors,
                   uint64_t seed) const;
+  /// From derivatives by splats, in the cube around the origin, to those by weights and latent.
+  void backwardOfSplats(std::span<const float> values, const ContextRows& latent, Splats& splats,
+                        const SplatCloud& by_cloud, std::span<float> gradients,
+                        float* by_latent) const;
   /// Derivatives by the latent; losses of images go to `losses`.
   void addImages(std::span<const float> values, const AutoencoderExample& example,
                  const AutoencoderLossWeights& weights, const BackendFactory& backends,

@@ -63,7 +63,7 @@ PreparedImage imageOf(const SplatCloud& cloud) {
 }
 
 double likeness(const SplatCloud& cloud, const PreparedImage& image) {
-  return imageLikeness(*cpuBackends(), cloud, image);
+  return imageLikeness(*cpuBackends(), cloud, image).psnr;
 }
 
 // Its own image is reached to within the angle of the last halving (3 degrees) and a pixel of the

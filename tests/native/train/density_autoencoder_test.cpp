@@ -162,6 +162,57 @@ TEST(DensityAutoencoder, HasTheSameDerivativesForAnyNumberOfThreads) {
   EXPECT_EQ(together, alone);
 }
 
+/// L1 of a view, where shapes are those of one latent and colours those of another.
+double lossOf(const DensityAutoencoder& networks, std::span<const float> values,
+              std::span<const float> shapes, std::span<const float> colours, const ObjectView& view,
+              const AnchorDraw& draw) {
+  SplatCloud cloud = networks.decode(values, shapes, draw.anchors, draw.seed);
+  cloud.sh = networks.decode(values, colours, draw.anchors, draw.seed).sh;
+  RenderOptions options;
+  options.with_depth = false;
+  options.with_background = true;
+  const std::unique_ptr<ViewPass> pass = cpuBackends()->makeViewPass();
+  pass->forward(cloud, view.camera, options);
+  return pass->loss(view.image, {}, lossFor({}, 0)).l1;
+}
+
+TEST(DensityAutoencoder, DerivativesByColoursAreThoseOfFiniteDifferences) {
+  const DensityAutoencoder networks(smallSizes());
+  const std::vector<float> values = speakingValues(networks);
+  const TrainingObject object = ball();
+  const std::vector<float> latent = networks.encode(values, object, 24);
+  const ObjectView view = object.views->view(3);
+  AnchorDraw draw = {128, 0};
+  while (keyedBits(draw.seed, RandomUse::kBackground, 0) & 1) ++draw.seed;  // Before black.
+  std::vector<float> by_latent(latent.size(), 0.0f);
+  const double l1 =
+      networks.addColours(values, latent, view, draw, 0, *cpuBackends(), by_latent).l1;
+  EXPECT_NEAR(l1, lossOf(networks, values, latent, latent, view, draw), 1e-6);
+  // Along what raises it most, and along another direction.
+  for (const uint64_t seed : {0, 1}) {
+    std::vector<float> ahead = latent, behind = latent;
+    double slope = 0, squares = 0;
+    std::vector<double> along(latent.size());
+    for (size_t i = 0; i < latent.size(); ++i) {
+      const double drawn = unitDouble(keyedBits(seed, RandomUse::kTokenNoise, i)) - 0.5;
+      along[i] = seed == 0 ? static_cast<double>(by_latent[i])
+                           : drawn + 20 * static_cast<double>(by_latent[i]);
+      squares += along[i] * along[i];
+    }
+    constexpr double kStep = 0.1;  // Large, as float32 images tell 1e-7 of a loss of 0.1.
+    for (size_t i = 0; i < latent.size(); ++i) {
+      const double move = kStep * along[i] / std::sqrt(squares);
+      slope += static_cast<double>(by_latent[i]) * along[i] / std::sqrt(squares);
+      ahead[i] += static_cast<float>(move);
+      behind[i] -= static_cast<float>(move);
+    }
+    const double difference = (lossOf(networks, values, latent, ahead, view, draw) -
+                               lossOf(networks, values, latent, behind, view, draw)) /
+                              (2 * kStep);
+    EXPECT_NEAR(slope, difference, 0.03 * std::abs(difference)) << seed;
+  }
+}
+
 /// What anchors do to images, as the derivative by the biases of the density's logits. In: side of
 /// the images. Out: their L1.
 std::vector<double> densityGradient(uint32_t side, double& l1) {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/random.h"
 #include "train/networks/density_autoencoder.h"
 #include "train/sphere_views.h"
 
@@ -85,6 +86,18 @@ inline AutoencoderSizes smallSizes() {
   sizes.gaussians = 4;
   sizes.leaf_level = 4;
   return sizes;
+}
+
+/// Weights whose splats differ with the latent from the first step on, in an even density: what
+/// begins with 0 in the last layer of splats is drawn.
+inline std::vector<float> speakingValues(const DensityAutoencoder& networks) {
+  std::vector<float> values = networks.startValues(1);
+  const Parameter& last = networks.layout().find("gs.out_proj.weight");
+  for (size_t i = 0; i < last.count; ++i) {
+    const double u = unitDouble(keyedBits(9, RandomUse::kTokenNoise, i));
+    values[last.first + i] = static_cast<float>(2 * (u - 0.5));
+  }
+  return values;
 }
 
 }  // namespace stipple

@@ -22,8 +22,8 @@ CANVASES = (('1024', "1024", "What the networks were trained with last"),
 class GenerateOperator(JobOperator):
     """Mix-in. The operator gives start(context) → ImageTask, and places objects by _matrix(index)."""
 
-    shown_settings = ('steps', 'guidance', 'tokens', 'canvas', 'seed', 'seed_count', 'keep_best', 'anchors',
-                      'show_previews')
+    shown_settings = ('steps', 'guidance', 'tokens', 'canvas', 'seed', 'seed_count', 'keep_best', 'match_colours',
+                      'anchors', 'show_previews')
     has_image = True
     escape_text = 'Esc stops; the same settings go on from there'
 
@@ -40,6 +40,9 @@ class GenerateOperator(JobOperator):
                             default=1, min=1, max=64, soft_max=8)
     keep_best: BoolProperty(name="Keep the Best", description="Of the seeds, keep only the object that looks most like "
                             "the image", default=False)
+    match_colours: BoolProperty(name="Match Colors", description="Lead the colors of the object closer to those of the "
+                                "image. Networks that were learned from a collection can do this, such as those that "
+                                "come with Stipple", default=False)
     anchors: IntProperty(name="Anchors", description="Budget of the splats at first, in anchors that each become several "
                          "splats; 0 for what the decoder was trained with. It can be changed afterwards", default=0,
                          min=0, soft_max=8192)
@@ -51,7 +54,7 @@ class GenerateOperator(JobOperator):
 
     def _settings(self, wanted_size):
         return image_task.GenerateSettings(self.steps, self.guidance, self.tokens, int(self.canvas), self.seed,
-                                           wanted_size, self.show_previews)
+                                           wanted_size, self.show_previews, self.match_colours)
 
     def modal(self, context, event):
         result = super().modal(context, event)

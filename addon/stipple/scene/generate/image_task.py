@@ -29,11 +29,13 @@ class GenerateSettings:
     seed: int = 42
     size: float = 1.0      # metres
     previews: bool = True
+    matches_colours: bool = False
 
     def fields(self):
         """Fields of StippleGenerateOptions."""
         return {'steps': self.steps, 'guidance': self.guidance, 'token_count': self.tokens, 'canvas_size': self.canvas,
-                'seed': self.seed, 'size': self.size, 'preview_steps': _PREVIEW_STEPS if self.previews else 0}
+                'seed': self.seed, 'size': self.size, 'preview_steps': _PREVIEW_STEPS if self.previews else 0,
+                'matches_colours': int(self.matches_colours)}
 
 
 @dataclass(frozen=True)
@@ -89,26 +91,31 @@ class ImageTask(Task):
 
     def _work(self, task):
         count = len(self._settings)
-        parts = [(index / count, (index + 1) / count) for index in range(count)]
+        matches = self._settings[0].matches_colours
+        again = self._keeps_best and matches  # the chosen one is made once more, with its colours matched
+        parts = [(index / (count + again), (index + 1) / (count + again)) for index in range(count + again)]
         if not self._keeps_best:
-            return [self._decoded(task, index, self._model(task, index, part)[0], part)
+            return [self._decoded(task, index, self._model(task, index, part, matches)[0], part)
                     for index, part in enumerate(parts)]
         best, most = None, None
-        for index, part in enumerate(parts):
-            model, likeness = self._model(task, index, part)
+        for index, part in enumerate(parts[:count]):
+            model, likeness = self._model(task, index, part, False)
             if best is None or likeness > most:
                 best, most = (index, model), likeness
+        if again:
+            best = best[0], self._model(task, best[0], parts[-1], True)[0]
         made = self._decoded(task, *best, parts[-1])
         for path in self._checkpoints:  # until now, so that a task that was stopped keeps what it has
             _remove(path)
         return [made]
 
-    def _model(self, task, index, part):
-        """The Model of a seed, and its likeness to the image."""
+    def _model(self, task, index, part, matches):
+        """The Model of a seed, and its likeness to the image. In: matches: whether its colours are matched."""
         begin, middle = part[0], _middle(part)
         path = self._checkpoints[index]
+        settings = replace(self._settings[index], matches_colours=matches)
         options = generate_options(self._native.library, self._folder, path, measures_likeness=int(self._keeps_best),
-                                   **self._settings[index].fields())
+                                   **settings.fields())
         job = Generation.start(self._native, self._image, self._mask, options, self._encoded)
         self._running = index, job
         try:
