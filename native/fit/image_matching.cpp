@@ -1,6 +1,7 @@
 #include "fit/image_matching.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "train/optimiser/weight_optimiser.h"
@@ -43,14 +44,21 @@ ObjectView viewOf(const PreparedImage& image, const Camera& camera) {
 }  // namespace
 
 double matchingOperations(const DensityAutoencoder& networks, uint64_t anchors) {
-  double weights = 0;
+  double of_splats = 0, of_density = 0;
   for (const Parameter& parameter : networks.layout().parameters()) {
-    if (parameter.name.starts_with("gs.")) weights += static_cast<double>(parameter.count);
+    const auto weights = static_cast<double>(parameter.count);
+    if (parameter.name.starts_with("gs.")) of_splats += weights;
+    if (parameter.name.starts_with("octree.")) of_density += weights;
   }
-  // A multiplication and an addition for each weight and anchor; blocks are run again on the way
-  // back, which takes twice as many.
+  // A multiplication and an addition for each weight and row. Anchors are drawn once; blocks of
+  // splats are run again on the way back, which takes twice as many.
   constexpr double kRuns = 4;
-  return static_cast<double>(kSteps * anchors) * 2 * kRuns * weights;
+  double cells = 0;
+  for (int level = 0; level < networks.sizes().leaf_level; ++level) {
+    cells += std::min(std::exp2(3 * level), static_cast<double>(anchors));
+  }
+  return static_cast<double>(kSteps) * 2 *
+         (kRuns * static_cast<double>(anchors) * of_splats + cells * of_density);
 }
 
 uint64_t matchingBytes(const DensityAutoencoder& networks, uint64_t anchors, uint32_t side) {

@@ -95,7 +95,8 @@ TEST_F(ColourMatching, EndsWhenItIsCancelled) {
 }
 
 TEST_F(ColourMatching, TakesAsMuchAsItSays) {
-  EXPECT_GT(matchingOperations(networks_, 256), 1.9 * matchingOperations(networks_, 128));
+  // But for the few cells at the root of the density, which are asked about once.
+  EXPECT_GT(matchingOperations(networks_, 256), 1.7 * matchingOperations(networks_, 128));
   EXPECT_GT(matchingBytes(networks_, 128, kSide),
             networks_.layout().size() * sizeof(float) + uint64_t{kSide} * kSide * 20);
 }
