@@ -1,5 +1,6 @@
 #include "train/anchors/passing_places.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <memory>
 
@@ -14,6 +15,9 @@ namespace {
 
 /// They are asked about at 48 times: more would cost memory and tell little.
 constexpr uint64_t kMostPlaces = 100000;
+
+/// Splats of an anchor that begins have the tanh of this for opacity, at least.
+constexpr double kFaint = 0.1;
 
 }  // namespace
 
@@ -64,6 +68,40 @@ std::vector<uint32_t> allButFaintest(const ScaffoldParameters& scaffold, size_t 
   rows.resize(rows.size() - std::min(dropped, rows.size()));
   std::sort(rows.begin(), rows.end());
   return rows;
+}
+
+std::vector<float> faintFeatures(const Mlp& opacity) {
+  constexpr int kMostRounds = 50;
+  const auto count = static_cast<Eigen::Index>(opacity.outputWidth());
+  std::vector<float> features(kScaffoldFeatures, 0.0f);
+  using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Rows input(count, Eigen::Index{kScaffoldFeatures}), by_features = input;
+  const Rows each_alone = Rows::Identity(count, count);
+  const auto numbersOf = [](auto& rows) {
+    return std::span(rows.data(), static_cast<size_t>(rows.size()));
+  };
+  std::vector<LinearLayer> unused = opacity.zeros();
+  MlpTape tape;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const Eigen::Map<const Eigen::RowVectorXf> at(features.data(), Eigen::Index{kScaffoldFeatures});
+    input.rowwise() = at;
+    opacity.forward(numbersOf(input), static_cast<size_t>(count), tape);
+    const Eigen::VectorXd seen =
+        Eigen::Map<const Eigen::VectorXf>(tape.output().data(), count).cast<double>();
+    const Eigen::VectorXd missing = (kFaint - seen.array()).cwiseMax(0.0);
+    if (!(missing.maxCoeff() > 0.01 * kFaint)) break;
+    // The shortest step that would do if the network were linear, held back where it hardly is.
+    opacity.backward(numbersOf(input), tape, numbersOf(each_alone), unused, numbersOf(by_features));
+    const Eigen::MatrixXd jacobian = by_features.cast<double>();
+    Eigen::MatrixXd normal = jacobian * jacobian.transpose();
+    normal.diagonal().array() += 1e-3 * normal.trace() / static_cast<double>(count) + 1e-9;
+    const Eigen::VectorXd step = jacobian.transpose() * normal.ldlt().solve(missing);
+    if (!step.allFinite()) break;
+    for (size_t i = 0; i < kScaffoldFeatures; ++i) {
+      features[i] += static_cast<float>(step[static_cast<Eigen::Index>(i)]);
+    }
+  }
+  return features;
 }
 
 }  // namespace stipple

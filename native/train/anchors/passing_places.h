@@ -32,4 +32,10 @@ PassingPlaces passingPlaces(const ViewSource& views, std::span<const size_t> tra
 /// ascending. In: dropped: how many those are.
 std::vector<uint32_t> allButFaintest(const ScaffoldParameters& scaffold, size_t dropped);
 
+/// Features at which a network of opacities shows all splats of an anchor, if faintly: 0 where it
+/// does, as at the start of a fit, else what is nearest to 0. Splats that are not there learn
+/// nothing, and networks that have learned for long need not show those of features of 0.
+/// Returns: [kScaffoldFeatures].
+std::vector<float> faintFeatures(const Mlp& opacity);
+
 }  // namespace stipple

@@ -14,6 +14,7 @@
 #include "base/number_text.h"
 #include "base/random.h"
 #include "base/stopwatch.h"
+#include "train/anchors/handed_on.h"
 #include "train/anchors/passing_places.h"
 #include "train/anchors/relay_parts.h"
 #include "train/anchors/relay_segments.h"
@@ -131,6 +132,7 @@ class RelayModel final : public FitModel {
     putValues("relay.steps", std::vector<uint64_t>{steps_, entered_ ? *entered_ + 1 : uint64_t{0}},
               table);
     putValues("relay.first_key", std::vector<uint64_t>{options_.clip.first_key}, table);
+    putValues("relay.hands_on", std::vector<uint64_t>{1}, table);
     return table;
   }
 
@@ -145,6 +147,11 @@ class RelayModel final : public FitModel {
       fail(ErrorCode::kFormat,
            "the checkpoint is of a fit whose key frames stand at other frames; remove it to begin "
            "anew");
+    }
+    // Until 30 November 2026 all key frames came before all windows.
+    if (!table.contains("relay.hands_on")) {
+      fail(ErrorCode::kFormat,
+           "the checkpoint is of a fit whose key frames all began alike; remove it to begin anew");
     }
     RelayWork work = workOf(table, work_);
     anchor_counts_ = takeValues<uint64_t>(table, "relay.anchor_counts", anchor_counts_.size(),
@@ -226,12 +233,13 @@ class RelayModel final : public FitModel {
       case RelayStage::kGlobal:
         break;
       case RelayStage::kKeyFrame:
-        begin(withPassing(parts_->keyFrame(RelayStage::kGlobal, 0), segment.key));
+        begin(startOfKeyFrame(segment.key), {});
         break;
       case RelayStage::kWindow: {
-        KeyFrame frame = parts_->keyFrame(RelayStage::kKeyFrame, segment.key);
-        frame.deformation = makeDeformation(planesOf(frame.scaffold), frame.scaffold.gaussians);
-        begin(std::move(frame));
+        ScaffoldState state = std::move(work_.state);
+        AnchorDeformation deformation =
+            makeDeformation(planesOf(*state.scaffold), state.scaffold->gaussians);
+        begin(std::move(state), std::move(deformation));
         break;
       }
       case RelayStage::kBlend:
@@ -242,28 +250,41 @@ class RelayModel final : public FitModel {
     entered_ = index;
   }
 
-  void begin(KeyFrame frame) {
-    work_ = workOn(std::move(frame));
+  void begin(ScaffoldState state, AnchorDeformation deformation) {
+    state.statistics = {};
+    state.follow();
+    work_ = workOn(std::move(state), std::move(deformation));
     if (options_.grows_by_level) {
       work_.state.levels =
           levelsOfFeatures(work_.state.scaffold->features, options_.level_quantiles);
     }
   }
 
-  /// With anchors at what passes at the time of the key frame. Where there is no room, those that
-  /// are faintest go.
-  KeyFrame withPassing(KeyFrame frame, uint32_t key) const {
+  /// The global anchors, with what has been learned of them since, and anchors at what passes at
+  /// the time of the key frame. Where there is no room, those that are faintest go. What is at hand
+  /// until then is of the segment before: the global one, or the window of the key frame before.
+  ScaffoldState startOfKeyFrame(uint32_t key) {
+    ScaffoldState state = std::move(work_.state);
+    if (key > 0) {
+      state = handedOn(std::move(state), parts_->keyFrame(RelayStage::kGlobal, 0).scaffold);
+    }
     const double about = kFramesAboutKey / options_.clip.frames_per_second;
     const double at = options_.clip.timeOf(key);
     const std::vector<float> places = passing_.between(at - about, at + about);
-    if (places.empty()) return frame;
+    if (places.empty()) return state;
     const uint64_t most = options_.anchors.most_anchors;
     const uint64_t room = std::min<uint64_t>(
         places.size() / 3, static_cast<uint64_t>(kPassingShare * static_cast<double>(most)));
-    const uint64_t all = frame.scaffold.size() + room;
-    if (all > most) keepAnchors(frame.scaffold, allButFaintest(frame.scaffold, all - most));
-    addStartingAnchors(places, voxel_, room, frame.scaffold);
-    return frame;
+    const uint64_t all = state.scaffold->size() + room;
+    if (all > most) state.keep(allButFaintest(*state.scaffold, all - most));
+    const size_t before = state.scaffold->features.size();
+    addStartingAnchors(places, voxel_, room, *state.scaffold);
+    const std::vector<float> faint = faintFeatures(state.scaffold->opacity);
+    for (size_t i = before; i < state.scaffold->features.size(); ++i) {
+      state.scaffold->features[i] = faint[i % kScaffoldFeatures];
+    }
+    state.follow();
+    return state;
   }
 
   void loadPair(uint32_t key) {

@@ -60,8 +60,8 @@ std::vector<RelaySegment> relaySegments(uint64_t iterations, const KeyFrameClip&
   add(RelayStage::kGlobal, 0, kGlobalShare);
   for (uint32_t key = 0; key < keys; ++key) {
     add(RelayStage::kKeyFrame, key, kKeyFrameShare / keys);
+    add(RelayStage::kWindow, key, window_share / keys);
   }
-  for (uint32_t key = 0; key < keys; ++key) add(RelayStage::kWindow, key, window_share / keys);
   for (uint32_t key = 0; blends && key + 1 < keys; ++key) {
     add(RelayStage::kBlend, key, blend_share / (keys - 1));
   }

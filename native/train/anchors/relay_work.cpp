@@ -63,10 +63,10 @@ uint64_t RelayWork::bytes() const {
          floats * sizeof(float);
 }
 
-RelayWork workOn(KeyFrame frame) {
+RelayWork workOn(ScaffoldState state, AnchorDeformation deformation) {
   RelayWork work;
-  work.state = startState(std::move(frame.scaffold));
-  work.deformation = std::move(frame.deformation);
+  work.state = std::move(state);
+  work.deformation = std::move(deformation);
   forEachArray(work.deformation, [&](const std::vector<float>& values, bool) {
     work.deformation_moments.push_back(zerosLike(values));
   });

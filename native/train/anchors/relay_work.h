@@ -24,8 +24,9 @@ struct RelayWork {
   uint64_t bytes() const;
 };
 
-/// Begins on a key frame, or on the blending of two. In: like, for what networks have.
-RelayWork workOn(KeyFrame frame);
+/// Begins on a key frame, or on the blending of two. In: deformation: not there outside of windows;
+/// like, for what networks have.
+RelayWork workOn(ScaffoldState state, AnchorDeformation deformation);
 RelayWork blendWorkOf(const KeyFrame& before, const KeyFrame& behind, const RelayWork& like);
 
 /// The key frame under way.

@@ -165,6 +165,33 @@ TEST(PassingPlaces, AnchorsThatAreFaintestMakeRoom) {
   EXPECT_THAT(allButFaintest(*scaffold, 9), IsEmpty());
 }
 
+/// What a network of opacities says of features.
+std::vector<float> saidOf(const Mlp& opacity, const std::vector<float>& features) {
+  MlpTape tape;
+  opacity.forward(features, 1, tape);
+  return {tape.output().begin(), tape.output().end()};
+}
+
+TEST(PassingPlaces, FeaturesOfNewAnchorsShowAllTheirSplats) {
+  ScaffoldShape shape;
+  shape.seed = 5;
+  Mlp opacity = makeScaffold(shape).opacity;
+  // As a fit begins features of 0 do.
+  EXPECT_THAT(faintFeatures(opacity), Each(0.0f));
+  // As it goes on they need not.
+  std::vector<float>& biases = opacity.layers().back().biases;
+  for (size_t k = 0; k < biases.size(); k += 2) biases[k] = -0.3f - 0.05f * static_cast<float>(k);
+  for (float& weight : opacity.layers().back().weights) weight *= 20;
+  const std::vector<float> zeros(kScaffoldFeatures, 0.0f);
+  std::vector<float> said = saidOf(opacity, zeros);
+  ASSERT_LT(*std::min_element(said.begin(), said.end()), -0.2f);
+  said = saidOf(opacity, faintFeatures(opacity));
+  EXPECT_GT(*std::min_element(said.begin(), said.end()), 0.09f);
+  // A network that hears nothing of features stays as it is, and so do they.
+  for (float& weight : opacity.layers().back().weights) weight = 0;
+  EXPECT_THAT(faintFeatures(opacity), Each(0.0f));
+}
+
 TEST(PassingPlaces, KeyFramesBeginWithAnchorsThere) {
   const auto views = aBallThatComes();
   RelayModelOptions options;
@@ -179,7 +206,9 @@ TEST(PassingPlaces, KeyFramesBeginWithAnchorsThere) {
   const auto store = std::make_shared<MemoryKeyFrames>();
   const auto model = makeRelayModel(*cpuBackends(), *views, training, options, store);
   const std::vector<RelaySegment> segments = relaySegments(options.iterations, options.clip);
-  for (uint64_t i = 0; i < segments[4].end; ++i) {
+  ASSERT_EQ(segments[7].stage, RelayStage::kKeyFrame);
+  ASSERT_EQ(segments[7].key, 3u);
+  for (uint64_t i = 0; i < segments[7].end; ++i) {
     FitMoment moment;
     moment.iteration = i + 1;
     moment.iterations = options.iterations;

@@ -108,6 +108,24 @@ struct Fit {
         std::make_unique<Trainer>(*cpuBackends(), views, split, std::move(made), trainer_options);
   }
 
+  /// The first steps, which the model alone makes.
+  void runTo(uint64_t steps, uint64_t iterations) {
+    for (uint64_t i = 0; i < steps; ++i) {
+      FitMoment moment;
+      moment.iteration = i + 1;
+      moment.iterations = iterations;
+      moment.extent = 1;
+      const size_t index = *model->viewAt(i);
+      const size_t v = index / (kCameras - 1) * kCameras + index % (kCameras - 1);
+      StepView view;
+      view.camera = &views->camera(v);
+      view.time = views->time(v);
+      const ViewPicture picture = views->load(v);
+      view.target = picture.colour.data();
+      model->step(moment, view, nullptr, nullptr);
+    }
+  }
+
   std::shared_ptr<MemoryViewSource> views;
   std::shared_ptr<CountingStore> store;
   FitModel* model;
@@ -124,9 +142,14 @@ TEST(RelaySegments, HaveAllStagesInTheirOrder) {
   EXPECT_EQ(segments.back().end, 1000u);
   for (size_t i = 1; i < segments.size(); ++i) {
     EXPECT_EQ(segments[i].begin, segments[i - 1].end) << i;
-    EXPECT_GE(segments[i].stage, segments[i - 1].stage) << i;
   }
-  EXPECT_EQ(segments[4].stage, RelayStage::kWindow);
+  for (uint32_t key = 0; key < 3; ++key) {
+    EXPECT_EQ(segments[1 + 2 * key].stage, RelayStage::kKeyFrame);
+    EXPECT_EQ(segments[2 + 2 * key].stage, RelayStage::kWindow) << "before the next key frame";
+    EXPECT_EQ(segments[1 + 2 * key].key, key);
+    EXPECT_EQ(segments[2 + 2 * key].key, key);
+    EXPECT_EQ(segments[7 + std::min(key, 1u)].stage, RelayStage::kBlend);
+  }
   EXPECT_NEAR(static_cast<double>(segments[4].end - segments[4].begin), 500.0 / 3, 1);
   // Without blending its steps go to the windows; few steps leave one for each segment.
   EXPECT_EQ(relaySegments(1000, clipOf(25, 8, KeyFrameBlend::kNone)).size(), 7u);
@@ -247,7 +270,7 @@ TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
   EXPECT_GT(psnrAt(fit, 0), moving - 3);
   EXPECT_GT(psnrAt(fit, kFrames - 1), moving - 3);
   // Every part was written once: all of the clip, two key frames, two windows, a pair.
-  EXPECT_THAT(fit.store->names, ElementsAre("global", "key0.stage2", "key1.stage2", "key0.stage3",
+  EXPECT_THAT(fit.store->names, ElementsAre("global", "key0.stage2", "key0.stage3", "key1.stage2",
                                             "key1.stage3", "pair0.stage4"));
   const KeyFrameSource source = relayResult(*fit.model);
   ASSERT_TRUE(source);
@@ -262,32 +285,14 @@ TEST(RelayModel, LearnsAClipThatAnchorsAtRestCannot) {
 }
 
 TEST(RelayModel, EachStageStartsWhereTheLastEnded) {
-  // 100 global steps and 50 for the next stage: after the first step of a stage the model has moved
-  // by that step alone.
   const RelayModelOptions options = smallOptions(400);
   const std::vector<RelaySegment> segments = relaySegments(400, options.clip);
   Fit fit(options);
-  const auto runTo = [&](uint64_t steps) {
-    for (uint64_t i = 0; i < steps; ++i) {
-      FitMoment moment;
-      moment.iteration = i + 1;
-      moment.iterations = 400;
-      moment.extent = 1;
-      const size_t index = *fit.model->viewAt(i);
-      const size_t v = index / (kCameras - 1) * kCameras + index % (kCameras - 1);
-      StepView view;
-      view.camera = &fit.views->camera(v);
-      view.time = fit.views->time(v);
-      const ViewPicture picture = fit.views->load(v);
-      view.target = picture.colour.data();
-      fit.model->step(moment, view, nullptr, nullptr);
-    }
-  };
   uint64_t end_of_keys = 0;
   for (const RelaySegment& one : segments) {
     if (one.stage == RelayStage::kKeyFrame) end_of_keys = one.end;
   }
-  runTo(end_of_keys);
+  fit.runTo(end_of_keys, 400);
   const KeyFrameSource source = relayResult(*fit.model);
   const std::shared_ptr<const KeyFrame> key = source(1);
   EXPECT_FALSE(key->deformation.isThere());
@@ -306,13 +311,49 @@ TEST(RelayModel, EachStageStartsWhereTheLastEnded) {
   }
 }
 
+/// The root of the mean squared difference of the features of anchors that both have.
+double apart(const ScaffoldParameters& one, const ScaffoldParameters& other) {
+  double sum = 0;
+  size_t count = 0;
+  for (size_t a = 0; a < one.size(); ++a) {
+    for (size_t b = 0; b < other.size(); ++b) {
+      if (!std::equal(&one.positions[a * 3], &one.positions[a * 3] + 3, &other.positions[b * 3])) {
+        continue;
+      }
+      for (size_t i = 0; i < kScaffoldFeatures; ++i) {
+        const double d = static_cast<double>(one.features[a * kScaffoldFeatures + i]) -
+                         static_cast<double>(other.features[b * kScaffoldFeatures + i]);
+        sum += d * d;
+      }
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 100u) << "anchors that both have";
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+TEST(RelayModel, AKeyFrameBeginsWithWhatTheWindowBeforeHasLearned) {
+  const RelayModelOptions options = smallOptions(400);
+  Fit fit(options);
+  const std::vector<RelaySegment> segments = relaySegments(400, options.clip);
+  fit.runTo(segments[3].end, 400);  // the second key frame, 10 steps; a window has 100
+  const auto scaffoldOf = [&](const char* part) {
+    const ScaffoldShape shape = {options.anchors.gaussians_per_anchor, options.anchors.sh_degree};
+    return keyFrameOfTensors(*fit.store->get(part), "", shape).scaffold;
+  };
+  const ScaffoldParameters global = scaffoldOf("global"), window = scaffoldOf("key0.stage3"),
+                           second = scaffoldOf("key1.stage2");
+  EXPECT_LT(apart(window, second), 0.5 * apart(global, second));
+}
+
 TEST(RelayModel, GoesOnBitForBitFromEveryStage) {
   const RelayModelOptions options = smallOptions(200);
   Fit whole(options);
   whole.trainer->run(whole.observer, nullptr);
   const SplatCloud wanted = whole.model->splatsAt(0, 0.35);
-  // Inside the global stage, a key frame, a window and a pair.
-  for (const uint64_t stop : {31, 85, 121, 195}) {
+  // Inside the global stage, a key frame, its window, where the next key frame takes over (135),
+  // inside that one's window and a pair.
+  for (const uint64_t stop : {31, 82, 121, 135, 150, 195}) {
     auto store = std::make_shared<CountingStore>();
     Fit half(options, stop, store);
     half.trainer->run(half.observer, nullptr);
@@ -339,6 +380,21 @@ TEST(RelayModel, RefusesACheckpointOfOtherKeyFrames) {
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kFormat);
     EXPECT_THAT(error.what(), testing::HasSubstr("key frames stand at other frames"));
+  }
+}
+
+TEST(RelayModel, RefusesACheckpointWhoseKeyFramesAllBeganAlike) {
+  const RelayModelOptions options = smallOptions(200);
+  Fit half(options, 31);
+  half.trainer->run(half.observer, nullptr);
+  ASSERT_EQ(half.observer.saved.erase("relay.hands_on"), 1u) << "as before 30 November 2026";
+  Fit resumed(options);
+  try {
+    resumed.trainer->restore(half.observer.saved);
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kFormat);
+    EXPECT_THAT(error.what(), testing::HasSubstr("began alike"));
   }
 }
 
