@@ -236,10 +236,9 @@ class RelayModel final : public FitModel {
         begin(startOfKeyFrame(segment.key), {});
         break;
       case RelayStage::kWindow: {
-        ScaffoldState state = std::move(work_.state);
-        AnchorDeformation deformation =
-            makeDeformation(planesOf(*state.scaffold), state.scaffold->gaussians);
-        begin(std::move(state), std::move(deformation));
+        const ScaffoldParameters& scaffold = *work_.state.scaffold;
+        AnchorDeformation deformation = makeDeformation(planesOf(scaffold), scaffold.gaussians);
+        begin(std::move(work_.state), std::move(deformation));
         break;
       }
       case RelayStage::kBlend:
@@ -264,10 +263,11 @@ class RelayModel final : public FitModel {
   /// the time of the key frame. Where there is no room, those that are faintest go. What is at hand
   /// until then is of the segment before: the global one, or the window of the key frame before.
   ScaffoldState startOfKeyFrame(uint32_t key) {
+    // Read first: where it is not there, a checkpoint can still be written of what is at hand.
+    std::optional<KeyFrame> global;
+    if (key > 0) global = parts_->keyFrame(RelayStage::kGlobal, 0);
     ScaffoldState state = std::move(work_.state);
-    if (key > 0) {
-      state = handedOn(std::move(state), parts_->keyFrame(RelayStage::kGlobal, 0).scaffold);
-    }
+    if (global) state = handedOn(std::move(state), global->scaffold);
     const double about = kFramesAboutKey / options_.clip.frames_per_second;
     const double at = options_.clip.timeOf(key);
     const std::vector<float> places = passing_.between(at - about, at + about);

@@ -410,6 +410,8 @@ TEST(RelayModel, SaysWhichKeyFrameIsMissing) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("is not there"));
   }
+  // What was learned until then can still be kept.
+  EXPECT_TRUE(resumed.model->state().contains("scaffold.features"));
 }
 
 }  // namespace
