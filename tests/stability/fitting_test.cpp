@@ -148,7 +148,10 @@ TEST(FittingStability, SplatsBehindEveryCamera) {
     points.positions[i] += static_cast<float>(behind[static_cast<Eigen::Index>(i % 3)]);
   }
   views->setPoints(points);
-  const auto model = fitted(*views, 200, small());  // size is not judged yet
+  ExplicitModelOptions options = small();
+  // None beside the points.
+  options.start_splats = 50;
+  const auto model = fitted(*views, 200, options);  // size is not judged yet
   EXPECT_EQ(model->splats(0).size(), 50u);
   EXPECT_EQ(model->splats(0).positions, points.positions);
 }

@@ -19,7 +19,7 @@ namespace stipple {
 
 struct ExplicitModelOptions {
   std::string strategy = "adaptive";  ///< how splats are added and removed
-  uint64_t start_splats = 0;          ///< of the start; 0: as many as the prior has points
+  uint64_t start_splats = 0;          ///< of the start; 0: as StartOptions::count
   uint64_t max_splats = 0;            ///< hard cap; 0: none
   int sh_degree = 3;                  ///< 0..4; 0 without view-dependent colour
   Antialias antialias = Antialias::kClassic;

@@ -32,7 +32,9 @@ constexpr double kLeastSquaredSize = 1e-7;  ///< m^2
 /// Of the distance to the nearest camera: the size of a point without any neighbour.
 constexpr double kLonelyShare = 0.01;
 constexpr size_t kDepthPictures = 64;
-constexpr size_t kVolumeCameras = 64;
+constexpr size_t kMostCameras = 64;
+/// Of the longer side of a picture: a block that shows no known point is open.
+constexpr double kBlocksPerSide = 16;
 /// One of so many pixels must find a surface.
 constexpr uint64_t kLeastSwept = 4;
 constexpr float kOpaque = 0.5f;
@@ -66,12 +68,12 @@ std::vector<size_t> choosePoints(const PointSet& points, size_t count, uint64_t 
   return chosen;
 }
 
-StartPoints fromPoints(const ViewSource& views, const StartOptions& options) {
+/// In: count: as many of the points at most.
+StartPoints fromPoints(const ViewSource& views, uint64_t count, const StartOptions& options) {
   const PointSet& points = views.points();
-  const uint64_t wanted = options.count > 0 ? options.count : points.size();
   const bool is_display = views.colourSpace() == ColourSpace::kDisplay;
   StartPoints start;
-  for (const size_t i : choosePoints(points, capped(wanted, options.max_count), options.seed)) {
+  for (const size_t i : choosePoints(points, count, options.seed)) {
     float colour[3];
     for (size_t c = 0; c < 3; ++c) {
       const float linear = points.colours[i * 3 + c];
@@ -128,13 +130,19 @@ StartPoints fromDepth(const ViewSource& views, std::span<const size_t> training,
   return start;
 }
 
+/// Evenly of all training views.
+std::vector<Camera> someCameras(const ViewSource& views, std::span<const size_t> training) {
+  std::vector<Camera> cameras;
+  const size_t count = std::min(training.size(), kMostCameras);
+  for (size_t i = 0; i < count; ++i) {
+    cameras.push_back(views.camera(training[i * training.size() / count]));
+  }
+  return cameras;
+}
+
 StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training, uint64_t wanted,
                        const StartOptions& options) {
-  std::vector<Camera> cameras;
-  const size_t camera_count = std::min(training.size(), kVolumeCameras);
-  for (size_t i = 0; i < camera_count; ++i) {
-    cameras.push_back(views.camera(training[i * training.size() / camera_count]));
-  }
+  const std::vector<Camera> cameras = someCameras(views, training);
   const SharedVolume ball = sharedVolume(cameras);
   constexpr float kGrey[3] = {0.5f, 0.5f, 0.5f};
   /// A ball fills 0.52 of its cube; most of it is seen.
@@ -161,23 +169,72 @@ bool haveDepth(const ViewSource& views, std::span<const size_t> training) {
   return !views.load(training[0]).depth.empty();
 }
 
-/// Reconstructions find places where pictures are rich in detail, and walls and skies stay open.
-void addBesidePoints(const ViewSource& views, std::span<const size_t> training,
-                     const StartOptions& options, StartPoints& points, Progress* progress) {
+/// Share of the pictures that shows no known point, by blocks.
+double openShare(const ViewSource& views, std::span<const size_t> training) {
+  const std::vector<float>& places = views.points().positions;
+  const std::vector<Camera> cameras = someCameras(views, training);
+  std::vector<double> open(cameras.size());
+  parallelFor(cameras.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t c = begin; c < end; ++c) {
+      const Camera& camera = cameras[c];
+      const double side = std::max(camera.width, camera.height) / kBlocksPerSide;
+      const size_t columns = static_cast<size_t>(std::ceil(camera.width / side));
+      const size_t rows = static_cast<size_t>(std::ceil(camera.height / side));
+      std::vector<uint8_t> shows(columns * rows, 0);
+      for (size_t i = 0; i < places.size(); i += 3) {
+        double x = 0, y = 0;
+        const Vec3d point = Eigen::Map<const Vec3f>(&places[i]).cast<double>();
+        if (!project(camera, point, x, y)) continue;
+        const size_t column = std::min(static_cast<size_t>(x / side), columns - 1);
+        const size_t row = std::min(static_cast<size_t>(y / side), rows - 1);
+        shows[row * columns + column] = 1;
+      }
+      const double count = static_cast<double>(shows.size());
+      open[c] = static_cast<double>(std::count(shows.begin(), shows.end(), 0)) / count;
+    }
+  });
+  return std::accumulate(open.begin(), open.end(), 0.0) / static_cast<double>(open.size());
+}
+
+/// How many splats a start with points has of them, and how many beside them.
+struct PointShares {
+  uint64_t points;
+  uint64_t others;
+};
+
+/// Reconstructions find places where pictures are rich in detail, and walls and skies stay open,
+/// however many points there are. Where nothing is open, more than points makes fits no better.
+PointShares sharesOf(const ViewSource& views, std::span<const size_t> training, bool has_depth,
+                     const StartOptions& options) {
+  const uint64_t known = views.points().size();
+  if (options.count > 0) {
+    const uint64_t all = capped(options.count, options.max_count);
+    const uint64_t points = std::min(known, all);
+    return {points, all - points};
+  }
   // Samples of meshes come with depth, and tell of everything that is there. Where things move,
   // pictures of different times tell of no depth.
-  if (options.count == 0 && options.with_lives) return;
-  const uint64_t most = options.count > 0 ? options.count : placesOfPictures(views, training);
-  const uint64_t wanted = capped(most, options.max_count);
-  if (wanted <= points.size()) return;
-  const uint64_t missing = wanted - points.size();
-  if (haveDepth(views, training)) {
-    if (options.count > 0) {
-      points.append(fromDepth(views, training, missing, options, progress));
-    }
-  } else {
-    points.append(sweptPoints(views, training, {missing, options.seed}, progress));
-  }
+  if (options.with_lives || has_depth) return {capped(known, options.max_count), 0};
+  const uint64_t places = placesOfPictures(views, training);
+  const double share = std::min(2 * openShare(views, training), 0.5);
+  const uint64_t least = static_cast<uint64_t>(share * static_cast<double>(places));
+  const uint64_t others = std::max(places - std::min(places, known), least);
+  if (options.max_count == 0 || known + others <= options.max_count) return {known, others};
+  // Where there is no room for both, others get what they get at least, but half of it at most.
+  const uint64_t points =
+      std::min(known, options.max_count - std::min(least, options.max_count / 2));
+  return {points, options.max_count - points};
+}
+
+StartPoints withPoints(const ViewSource& views, std::span<const size_t> training,
+                       const StartOptions& options, Progress* progress) {
+  const bool has_depth = haveDepth(views, training);
+  const PointShares shares = sharesOf(views, training, has_depth, options);
+  StartPoints points = fromPoints(views, shares.points, options);
+  if (shares.others == 0) return points;
+  points.append(has_depth ? fromDepth(views, training, shares.others, options, progress)
+                          : sweptPoints(views, training, {shares.others, options.seed}, progress));
+  return points;
 }
 
 StartPoints withoutPoints(const ViewSource& views, std::span<const size_t> training,
@@ -253,13 +310,9 @@ SplatCloud splatsAt(const StartPoints& points, const ViewSource& views,
 
 StartSplats startSplats(const ViewSource& views, std::span<const size_t> training,
                         const StartOptions& options, Progress* progress) {
-  StartPoints points;
-  if (views.points().size() > 0) {
-    points = fromPoints(views, options);
-    addBesidePoints(views, training, options, points, progress);
-  } else {
-    points = withoutPoints(views, training, options, progress);
-  }
+  StartPoints points = views.points().size() > 0
+                           ? withPoints(views, training, options, progress)
+                           : withoutPoints(views, training, options, progress);
   StartSplats start;
   start.splats = splatsAt(points, views, training, options);
   if (options.with_lives) start.lives = pointLives(views, training, points, progress);

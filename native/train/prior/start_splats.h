@@ -15,12 +15,13 @@ namespace stipple {
 constexpr uint64_t kStartSplatsOfDepth = 50000;
 
 struct StartOptions {
-  /// Splats; 0: all points of the prior and, of views without depth in which nothing moves, at
-  /// least as many as pictures alone would give; or the constant above, or placesOfPictures()
-  /// (swept_points.h). If there are more points, it is drawn by their weights which are taken; if
-  /// fewer, what is missing is looked for in the pictures.
+  /// Splats; 0: all points of the prior and, of views without depth in which nothing moves, what is
+  /// missing to as many as pictures alone would give, placesOfPictures() (swept_points.h), or if
+  /// that is more, twice the share of the pictures that shows no point of those, half of them at
+  /// most; without points, those or the constant above. If there are more points, it is drawn by
+  /// their weights which are taken; if fewer, what is missing is looked for in the pictures.
   uint64_t count = 0;
-  uint64_t max_count = 0;   ///< hard cap; 0: none
+  uint64_t max_count = 0;   ///< hard cap; 0: none. Half of it at most is kept free of points
   bool with_lives = false;  ///< find how long points stay where they are
   int sh_degree = 3;
   Antialias antialias = Antialias::kClassic;

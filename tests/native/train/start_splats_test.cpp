@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "base/parallel.h"
 #include "math/colour.h"
@@ -77,7 +79,8 @@ TEST(StartSplats, PointsAtOnePlaceAndAPointAloneHaveASize) {
   StartOptions options;
   options.count = 10;
   // sqrt(1e-7).
-  for (const float scale : startOf(*views, options).scales) EXPECT_NEAR(scale, 0.7f * 3.162e-4f, 1e-6f);
+  for (const float scale : startOf(*views, options).scales)
+    EXPECT_NEAR(scale, 0.7f * 3.162e-4f, 1e-6f);
   points.positions.resize(3);
   points.colours.resize(3);
   points.opacities.resize(1);
@@ -140,11 +143,11 @@ TEST(StartSplats, KnowWhenTheirPointsWereSeen) {
 }
 
 /// A sphere before a pattern, and points of a reconstruction that knows its upper half alone.
-std::shared_ptr<MemoryViewSource> halfKnownSphere() {
+std::shared_ptr<MemoryViewSource> halfKnownSphere(size_t count = 300) {
   auto views = sphereViews(camerasAround(24, 64), Behind::kPattern);
   PointSet points;
-  for (size_t i = 0; i < 300; ++i) {
-    const double z = (static_cast<double>(i) + 0.5) / 300;
+  for (size_t i = 0; i < count; ++i) {
+    const double z = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
     const double turn = 2.399963 * static_cast<double>(i);  // the golden angle
     const double r = std::sqrt(1 - z * z);
     for (const double at : {r * std::cos(turn), r * std::sin(turn), z}) {
@@ -152,7 +155,7 @@ std::shared_ptr<MemoryViewSource> halfKnownSphere() {
     }
     points.opacities.push_back(1);
   }
-  points.colours.assign(900, 0.5f);
+  points.colours.assign(count * 3, 0.5f);
   views->setPoints(points);
   return views;
 }
@@ -182,6 +185,42 @@ TEST(StartSplats, WherePointsAreFewPicturesTellTheRest) {
   EXPECT_EQ(startOf(*views, options).size(), 500u);
   options.count = 300;
   EXPECT_EQ(startOf(*views, options).size(), 300u);
+}
+
+/// How many splats of the start stand at known points.
+size_t atPoints(const ViewSource& views, const SplatCloud& cloud) {
+  std::set<std::array<float, 3>> known;
+  const std::vector<float>& places = views.points().positions;
+  for (size_t i = 0; i < places.size(); i += 3) {
+    known.insert({places[i], places[i + 1], places[i + 2]});
+  }
+  size_t count = 0;
+  for (size_t i = 0; i < cloud.positions.size(); i += 3) {
+    count += known.count({cloud.positions[i], cloud.positions[i + 1], cloud.positions[i + 2]});
+  }
+  return count;
+}
+
+TEST(StartSplats, HoweverManyPointsThereArePicturesTellOfWhatTheyLeaveOut) {
+  const auto views = halfKnownSphere(7000);
+  const size_t places = 24u * 64 * 64 / 16;
+  StartOptions options;
+  SplatCloud cloud = startOf(*views, options);
+  EXPECT_EQ(cloud.size(), 7000 + places / 2);
+  EXPECT_EQ(atPoints(*views, cloud), 7000u);
+  // Without room for both, points are left out.
+  options.max_count = 8000;
+  cloud = startOf(*views, options);
+  EXPECT_EQ(cloud.size(), 8000u);
+  EXPECT_EQ(atPoints(*views, cloud), 8000 - places / 2);
+  options.max_count = 1000;
+  cloud = startOf(*views, options);
+  EXPECT_EQ(cloud.size(), 1000u);
+  EXPECT_EQ(atPoints(*views, cloud), 500u);
+  // Who asks for no more than points gets them alone.
+  options = {};
+  options.count = 7000;
+  EXPECT_EQ(atPoints(*views, startOf(*views, options)), 7000u);
 }
 
 TEST(StartSplats, BesidePointsOfThingsThatMoveNothingIsLookedForUnlessAskedFor) {
