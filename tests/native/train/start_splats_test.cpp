@@ -142,21 +142,27 @@ TEST(StartSplats, KnowWhenTheirPointsWereSeen) {
   }
 }
 
-/// A sphere before a pattern, and points of a reconstruction that knows its upper half alone.
-std::shared_ptr<MemoryViewSource> halfKnownSphere(size_t count = 300) {
-  auto views = sphereViews(camerasAround(24, 64), Behind::kPattern);
+/// Points of a sphere from a height, of its radius, to its top.
+PointSet spherePoints(size_t count, double radius, double lowest) {
   PointSet points;
   for (size_t i = 0; i < count; ++i) {
-    const double z = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+    const double z = lowest + (1 - lowest) * share;
     const double turn = 2.399963 * static_cast<double>(i);  // the golden angle
     const double r = std::sqrt(1 - z * z);
     for (const double at : {r * std::cos(turn), r * std::sin(turn), z}) {
-      points.positions.push_back(static_cast<float>(at));
+      points.positions.push_back(static_cast<float>(radius * at));
     }
     points.opacities.push_back(1);
   }
   points.colours.assign(count * 3, 0.5f);
-  views->setPoints(points);
+  return points;
+}
+
+/// A sphere before a pattern, and points of a reconstruction that knows its upper half alone.
+std::shared_ptr<MemoryViewSource> halfKnownSphere(size_t count = 300) {
+  auto views = sphereViews(camerasAround(24, 64), Behind::kPattern);
+  views->setPoints(spherePoints(count, 1, 0));
   return views;
 }
 
@@ -217,6 +223,10 @@ TEST(StartSplats, HoweverManyPointsThereArePicturesTellOfWhatTheyLeaveOut) {
   cloud = startOf(*views, options);
   EXPECT_EQ(cloud.size(), 1000u);
   EXPECT_EQ(atPoints(*views, cloud), 500u);
+  // Points all around the cameras leave nothing open.
+  views->setPoints(spherePoints(60000, 20, -1));
+  EXPECT_EQ(startOf(*views).size(), 60000u);
+  views->setPoints(spherePoints(7000, 1, 0));
   // Who asks for no more than points gets them alone.
   options = {};
   options.count = 7000;
