@@ -62,8 +62,9 @@ const FitOption kTable[] = {
      .kind = FitOptionKind::kCount,
      .member = member<&FitOptions::start_splats>(),
      .help = "The fit begins with this number of splats: at known points, and where images agree "
-             "if those are too few; 0: all points and, in photographs, others: 30,000 in all, or "
-             "up to 15,000 others where points leave images open. Of a scaffold these are anchors.",
+             "if those are too few; 0: all points; in photographs that makes 30,000 with "
+             "others, and has up to 15,000 others where points leave images open. Of a scaffold "
+             "these are anchors.",
      .models = kOfSplats | kOfScaffolds,
      .stored_of = kOfSplats | kOfScaffolds,
      .not_above = &FitOptions::max_splats,

@@ -2084,8 +2084,9 @@ typedef struct StippleFitOptions {
                                   "improved" */
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
   uint64_t max_splats;         /* explicit and motion: hard cap, 1..2^28 */
-  uint64_t start_splats;       /* explicit and motion, of a scaffold anchors; 0, the default: all known points and,
-                                  of photographs, others: 30,000 in all, up to 15,000 others where points leave images open */
+  uint64_t start_splats;       /* explicit and motion, of a scaffold anchors; 0, the default: all known points; of
+                                  photographs that makes 30,000 with others, and has up to 15,000 others where points
+                                  leave images open */
   uint64_t min_anchors;      /* field: the budgets of training, from min_anchors to max_anchors,
                                 1..STIPPLE_MAX_ANCHORS; default 1,024 to what the quality says: 8,192, 16,384 or
                                 32,768; scaffold: there are never more than max_anchors: 5,000, 15,000 or

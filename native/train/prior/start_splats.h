@@ -15,11 +15,11 @@ namespace stipple {
 constexpr uint64_t kStartSplatsOfDepth = 50000;
 
 struct StartOptions {
-  /// Splats; 0: all points of the prior and, of views without depth in which nothing moves, what is
-  /// missing to as many as pictures alone would give, placesOfPictures() (swept_points.h), or if
-  /// that is more, twice the share of the pictures that shows no point of those, half of them at
-  /// most; without points, those or the constant above. If there are more points, it is drawn by
-  /// their weights which are taken; if fewer, what is missing is looked for in the pictures.
+  /// Splats; 0: all points of the prior and, of views without depth in which nothing moves, places
+  /// beside them: as many as are missing to placesOfPictures() (swept_points.h), at least that
+  /// number times twice the share of the pictures that shows no point (1/2 at most); without
+  /// points, placesOfPictures() or the constant above. If there are more points than wanted, it is
+  /// drawn by their weights which are taken; if fewer, the pictures tell of others.
   uint64_t count = 0;
   uint64_t max_count = 0;   ///< hard cap; 0: none. Half of it at most is kept free of points
   bool with_lives = false;  ///< find how long points stay where they are

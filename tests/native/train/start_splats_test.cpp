@@ -79,8 +79,9 @@ TEST(StartSplats, PointsAtOnePlaceAndAPointAloneHaveASize) {
   StartOptions options;
   options.count = 10;
   // sqrt(1e-7).
-  for (const float scale : startOf(*views, options).scales)
+  for (const float scale : startOf(*views, options).scales) {
     EXPECT_NEAR(scale, 0.7f * 3.162e-4f, 1e-6f);
+  }
   points.positions.resize(3);
   points.colours.resize(3);
   points.opacities.resize(1);
